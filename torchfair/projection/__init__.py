@@ -1,0 +1,13 @@
+"""Guided projection: write the residual of one element, let the library assemble and solve."""
+
+from .guided_projection import GuidedProjection as GuidedProjection
+from .guided_projection import guided_projection as guided_projection
+from .loss import Loss as Loss
+from .loss import SmoothAbsolute as SmoothAbsolute
+from .loss import Squares as Squares
+from .result import IterationRecord as IterationRecord
+from .result import ProjectionResult as ProjectionResult
+from .result import Status as Status
+from .result import TermResidual as TermResidual
+from .settings import ProjectionSettings as ProjectionSettings
+from .term import ElementTerm as ElementTerm

@@ -1,0 +1,81 @@
+"""Variable blocks and the flat vector of unknowns behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from ..errors import ShapeError
+
+State = Mapping[str, Tensor]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How blocks ``name -> (n, d)`` lie in one flat vector: block after block, node after node.
+
+    A *node* is one row of a block, for example a vertex with its three coordinates.
+
+    Attributes:
+        sizes: ``(n, d)`` of every block, in order.
+    """
+
+    sizes: dict[str, tuple[int, int]]
+
+    @classmethod
+    def of(cls, state: State) -> Layout:
+        """Layout of unbatched blocks ``(n, d)``."""
+        for name, block in state.items():
+            if block.ndim != 2 or not block.is_floating_point():
+                raise ShapeError(f"block '{name}'", "a floating tensor (n, d)", f"{tuple(block.shape)} {block.dtype}")
+        return cls({name: (block.shape[0], block.shape[1]) for name, block in state.items()})
+
+    @property
+    def num_unknowns(self) -> int:
+        """Length of the flat vector."""
+        return sum(n * d for n, d in self.sizes.values())
+
+    @property
+    def num_nodes(self) -> int:
+        """Number of rows of all blocks."""
+        return sum(n for n, _ in self.sizes.values())
+
+    def offset(self, name: str) -> int:
+        """Position of the first unknown of a block."""
+        return self._before(name, lambda n, d: n * d)
+
+    def node_offset(self, name: str) -> int:
+        """Number of the first node of a block."""
+        return self._before(name, lambda n, d: n)
+
+    def _before(self, name: str, count: object) -> int:
+        total = 0
+        for other, (n, d) in self.sizes.items():
+            if other == name:
+                return total
+            total += count(n, d)  # type: ignore[operator]
+        raise KeyError(name)
+
+    def flatten(self, state: State) -> Tensor:
+        """Blocks as one vector."""
+        return torch.cat([state[name].reshape(-1) for name in self.sizes])
+
+    def unflatten(self, flat: Tensor) -> dict[str, Tensor]:
+        """One vector as blocks (views)."""
+        parts = torch.split(flat, [n * d for n, d in self.sizes.values()])  # type: ignore[no-untyped-call]
+        return {name: part.view(n, d) for (name, (n, d)), part in zip(self.sizes.items(), parts, strict=True)}
+
+    def free_mask(self, fixed: Mapping[str, Tensor], device: torch.device) -> Tensor:
+        """True where an unknown may move; ``fixed`` holds masks ``(n,)`` or ``(n, d)`` that are True where it may not."""
+        free = {name: torch.ones(size, dtype=torch.bool, device=device) for name, size in self.sizes.items()}
+        for name, mask in fixed.items():
+            if name not in self.sizes:
+                raise ShapeError("fixed", f"block names among {list(self.sizes)}", f"'{name}'")
+            n, d = self.sizes[name]
+            if mask.dtype != torch.bool or tuple(mask.shape) not in ((n,), (n, d)):
+                raise ShapeError(f"fixed['{name}']", f"a bool mask ({n},) or ({n}, {d})", f"{tuple(mask.shape)} {mask.dtype}")
+            free[name] &= ~(mask[:, None] if mask.ndim == 1 else mask).to(device)
+        return self.flatten(free)

@@ -1,0 +1,48 @@
+"""The default choice of a linear solver."""
+
+from __future__ import annotations
+
+import torch
+
+from ..system import Structure
+from .base import LinearSolver
+from .conjugate_gradients import ConjugateGradients
+from .dense import DenseQR
+from .rslab_direct import RslabDirect
+from .scipy_direct import ScipyDirect
+
+_DENSE_LIMIT = 120
+_RSLAB_LIMIT = 200_000
+_SCIPY_LIMIT = 12_000
+
+
+def choose_solver(name: str, structure: Structure) -> LinearSolver:
+    """A solver by name, or the fastest that suits the size of the problem.
+
+    Args:
+        name: ``"auto"``, ``"dense"``, ``"scipy"``, ``"rslab"`` or ``"cg"``. ``auto`` takes dense for a few
+            unknowns, a sparse direct solver for middle sizes (rslab if installed) and conjugate gradients
+            above that and on GPUs.
+        structure: The problem.
+
+    Raises:
+        ValueError: unknown name, or rslab is asked for and not installed.
+    """
+    makers = {"dense": DenseQR, "scipy": ScipyDirect, "rslab": RslabDirect, "cg": ConjugateGradients}
+    if name == "auto":
+        name = _automatic(structure.num_unknowns, structure.free.device)
+    if name not in makers:
+        raise ValueError(f"unknown linear solver '{name}': choose auto, {', '.join(makers)}")
+    if name == "rslab" and not RslabDirect.available():
+        raise ValueError("linear solver 'rslab' is not installed: pip install 'torchfair[direct]', or choose 'scipy'")
+    return makers[name]()
+
+
+def _automatic(size: int, device: torch.device) -> str:
+    if size <= _DENSE_LIMIT:
+        return "dense"
+    if device.type == "cpu" and RslabDirect.available() and size <= _RSLAB_LIMIT:
+        return "rslab"
+    if device.type == "cpu" and size <= _SCIPY_LIMIT:
+        return "scipy"
+    return "cg"

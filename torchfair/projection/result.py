@@ -1,0 +1,129 @@
+"""What a run of guided projection returns."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import asdict, dataclass, field
+
+from torch import Tensor
+
+
+class Status(enum.Enum):
+    """Why the iteration ended. ``message`` says what it means and what to do about it."""
+
+    STEP_TOLERANCE = "the step is shorter than step_tolerance: converged"
+    GRADIENT_TOLERANCE = "the gradient is smaller than gradient_tolerance: converged"
+    MERIT_TOLERANCE = "the merit no longer falls by more than merit_tolerance: converged"
+    ZERO_MERIT = "every residual is zero: converged"
+    MAX_ITERATIONS = "max_iterations reached: allow more iterations, or accept the result, which is the best found"
+    TIME_LIMIT = "time_limit reached: allow more time, or accept the result, which is the best found"
+    STALLED = "no damped step lowers the merit: converged as far as the arithmetic and the linear solver allow"
+    INTERRUPTED = "interrupted: the result is the best state found until then"
+    CALLBACK = "stopped by the callback: the result is the best state found until then"
+    SINGULAR = "the linear system stayed singular at the largest damping: check the term named below"
+
+    @property
+    def converged(self) -> bool:
+        """Whether a tolerance was met."""
+        return self in {
+            Status.STEP_TOLERANCE,
+            Status.GRADIENT_TOLERANCE,
+            Status.MERIT_TOLERANCE,
+            Status.ZERO_MERIT,
+            Status.STALLED,
+        }
+
+
+@dataclass(frozen=True)
+class TermResidual:
+    """One row of the residual table: unweighted residual norms over the elements of a term.
+
+    Attributes:
+        mean, largest: of the norm of the residual of an element, in the units of the residual.
+        merit: weighted share of the merit.
+    """
+
+    name: str
+    weight: float
+    elements: int
+    mean: float
+    largest: float
+    merit: float
+
+
+@dataclass(frozen=True)
+class IterationRecord:
+    """One damped step.
+
+    Attributes:
+        iteration: Counted from 1; record 0 is the start.
+        merit: Merit of the best state after this iteration; never rises.
+        damping: Levenberg-Marquardt parameter with which the step was made.
+        gain: Actual decrease of the merit over the predicted one.
+        step: Largest change of an unknown.
+        gradient: Largest scaled component of the gradient.
+        accepted: Whether the step was taken.
+        inner_iterations: Iterations of the linear solver.
+        elapsed: Seconds since the start.
+        quantities: What ``observe`` returned for the best state, for example energies.
+    """
+
+    iteration: int
+    merit: float
+    damping: float
+    gain: float
+    step: float
+    gradient: float
+    accepted: bool
+    inner_iterations: int
+    elapsed: float
+    quantities: dict[str, float] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON; the quantities stand beside the other entries."""
+        row = asdict(self)
+        row.update(row.pop("quantities"))
+        return row
+
+
+@dataclass(frozen=True)
+class ProjectionResult:
+    """The best state found, and how it was found.
+
+    Attributes:
+        blocks: The state.
+        status: Why the iteration ended; ``message`` is its text with details.
+        residuals: Residual table at the final state.
+        initial_residuals: Residual table at the start.
+        history: One record for each damped step, the start first.
+        solver: Name of the linear solver.
+        timings: Seconds spent in ``linearise``, ``solve`` and ``merit``, and ``total``.
+    """
+
+    blocks: dict[str, Tensor]
+    status: Status
+    message: str
+    residuals: list[TermResidual]
+    initial_residuals: list[TermResidual]
+    history: list[IterationRecord]
+    solver: str
+    timings: dict[str, float]
+
+    @property
+    def merit(self) -> float:
+        """Final merit."""
+        return self.history[-1].merit
+
+    @property
+    def iterations(self) -> int:
+        """Number of damped steps tried."""
+        return self.history[-1].iteration
+
+    def table(self) -> str:
+        """The residual table as text."""
+        lines = [f"{'term':<28}{'weight':>10}{'elements':>10}{'mean':>12}{'max':>12}{'merit':>12}"]
+        lines += [
+            f"{r.name:<28}{r.weight:>10.3g}{r.elements:>10}{r.mean:>12.3e}{r.largest:>12.3e}{r.merit:>12.3e}"
+            for r in self.residuals
+        ]
+        return "\n".join(lines)

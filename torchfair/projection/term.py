@@ -1,0 +1,156 @@
+"""An element term: the residual of one element, repeated over many elements of the state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+
+from ..errors import ShapeError
+from .layout import Layout, State
+from .loss import Loss, Squares
+
+Residual = Callable[..., Tensor]
+Refresh = Callable[[State], Sequence[Tensor]]
+
+
+@dataclass(frozen=True)
+class ElementTerm:
+    r"""A sum over elements of ``weight * element_weight * loss(|residual|^2)``.
+
+    Write :attr:`residual` for ONE element, in torch: it takes one tensor ``(k, d)`` for each entry of
+    :attr:`stencil`, then one tensor for each entry of the data, and returns a scalar or ``(m,)``. The
+    library maps it over the elements, differentiates it and assembles the sparse system::
+
+        def stretched(x, length):           # x: (2, 3), the two ends of an edge
+            return torch.linalg.vector_norm(x[1] - x[0]) - length
+
+        ElementTerm("edge length", stretched, [("vertices", topology.edges)], data=(lengths,), weight=10.0)
+
+    Attributes:
+        name: Shown in the residual table; terms of one name are reported together.
+        residual: The element function. It must be finite and differentiable where the solver goes; a value
+            that is not finite rejects the step (this makes barriers possible).
+        stencil: ``(block name, (n, k) index tensor)`` pairs.
+        data: Tensors ``(n, ...)`` handed to the residual element by element, constant for derivatives.
+        weight: Dimensionless weight of the term, at least 0.
+        element_weights: ``(n,)`` optional factors.
+        loss: :class:`Squares` or :class:`SmoothAbsolute`.
+        refresh: Called with every state that is evaluated; returns the ``data`` for that state (closest
+            points, frozen directions). The merit is therefore a function of the state alone.
+        merit: Element function with the same arguments that replaces the loss in the acceptance test, for
+            reweighted targets whose residual is only a quadratic model; same gradient, never below zero.
+        jacobian: Closed form of the derivative of the residual, ``(m, k_1 d_1 + k_2 d_2 + ...)`` or, for a
+            scalar residual, ``(k_1 d_1 + ...,)``; by default ``torch.func`` differentiates.
+        linear: The residual is affine in the state and has no refresh: differentiated only once.
+    """
+
+    name: str
+    residual: Residual
+    stencil: Sequence[tuple[str, Tensor]]
+    data: Sequence[Tensor] = ()
+    weight: float = 1.0
+    element_weights: Tensor | None = None
+    loss: Loss = field(default_factory=Squares)
+    refresh: Refresh | None = None
+    merit: Residual | None = None
+    jacobian: Residual | None = None
+    linear: bool = False
+
+    @property
+    def num_elements(self) -> int:
+        """N: number of elements."""
+        return self.stencil[0][1].shape[0]
+
+    def check(self, layout: Layout) -> None:
+        """Raises ShapeError unless stencil, data and weights fit each other and the blocks."""
+        what = f"term '{self.name}'"
+        if not self.stencil:
+            raise ShapeError(what, "a stencil with at least one block", "none")
+        for name, index in self.stencil:
+            if name not in layout.sizes:
+                raise ShapeError(what, f"blocks among {list(layout.sizes)}", f"'{name}'")
+            rows = layout.sizes[name][0]
+            if index.ndim != 2 or index.is_floating_point() or index.shape[0] != self.num_elements:
+                raise ShapeError(f"{what}, stencil of '{name}'", f"indices ({self.num_elements}, k)", tuple(index.shape))
+            if index.numel() and (int(index.min()) < 0 or int(index.max()) >= rows):
+                raise ShapeError(f"{what}, stencil of '{name}'", f"indices in 0..{rows - 1}", "indices outside")
+        for tensor in (*self.data, *(() if self.element_weights is None else (self.element_weights,))):
+            if tensor.shape[:1] != (self.num_elements,):
+                raise ShapeError(f"{what}, data", f"({self.num_elements}, ...)", tuple(tensor.shape))
+        if not self.weight >= 0.0:
+            raise ShapeError(f"{what}, weight", "a number of at least 0", self.weight)
+        if self.linear and (self.refresh is not None or not isinstance(self.loss, Squares) or self.merit is not None):
+            raise ShapeError(what, "a linear term with squares and without refresh or merit", "one of these")
+
+    def arguments(self, state: State) -> tuple[Tensor, ...]:
+        """Arguments of :attr:`residual` for all elements at once: ``(n, k, d)`` locals, then the data."""
+        local = tuple(state[name][index] for name, index in self.stencil)
+        data = self.data if self.refresh is None else self.refresh(state)
+        return (*local, *data)
+
+    def scaled_weights(self, squared: Tensor) -> Tensor:
+        """(n,) weight of ``|r|^2 / 2`` of every element in the quadratic model."""
+        weights = self.weight * self.loss.weight(squared)
+        return weights if self.element_weights is None else weights * self.element_weights
+
+    def values(self, arguments: tuple[Tensor, ...]) -> Tensor:
+        """Residuals ``(n, m)``."""
+        return as_rows(torch.func.vmap(self.residual)(*arguments))
+
+    def contributions(self, arguments: tuple[Tensor, ...], residuals: Tensor) -> Tensor:
+        """(n,) merit of every element."""
+        if self.merit is not None:
+            value = torch.func.vmap(self.merit)(*arguments)
+        else:
+            value = self.loss.value(residuals.square().sum(1))
+        value = self.weight * value
+        return value if self.element_weights is None else value * self.element_weights
+
+    def derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
+        """Residuals ``(n, m)`` and Jacobians ``(n, m, K)``, K unknowns of the stencil in order."""
+        if self.jacobian is not None:
+            closed = torch.func.vmap(self.jacobian)(*arguments)
+            return self.values(arguments), closed if closed.ndim == 3 else closed[:, None]
+        return differentiate(self.residual, arguments, len(self.stencil))
+
+
+def as_rows(values: Tensor) -> Tensor:
+    """``(n,)`` or ``(n, m)`` as ``(n, m)``."""
+    return values[:, None] if values.ndim == 1 else values
+
+
+def differentiate(residual: Residual, arguments: tuple[Tensor, ...], count: int) -> tuple[Tensor, Tensor]:
+    """Residuals ``(n, m)`` and Jacobians ``(n, m, K)`` with respect to the first ``count`` arguments.
+
+    Elements do not depend on each other, so the gradient of the sum of one component over all elements
+    holds that component's row of every element: reverse mode costs one sweep for each of the m components
+    (and needs none of the machinery that ``jacrev`` imports, which takes seconds).
+    """
+    local = [a.detach().requires_grad_() for a in arguments[:count]]
+    with torch.enable_grad():
+        values = as_rows(torch.func.vmap(residual)(*local, *arguments[count:]))
+        totals = values.sum(0).unbind() if values.requires_grad else ()
+    outputs, inputs = values.shape[1], sum(a[0].numel() for a in local) if values.shape[0] else 0
+    if outputs > inputs > 0:
+        return values.detach(), _forward_jacobian(residual, arguments, count)
+    rows = []
+    for total in totals:
+        gradients = torch.autograd.grad(total, local, retain_graph=True, materialize_grads=True)
+        rows.append(torch.cat([gradient.flatten(1) for gradient in gradients], dim=1))
+    values = values.detach()
+    if not rows:
+        return values, values.new_zeros(*values.shape, inputs)
+    return values, torch.stack(rows, dim=1)
+
+
+def _forward_jacobian(residual: Residual, arguments: tuple[Tensor, ...], count: int) -> Tensor:
+    """Jacobians by forward mode, for residuals with more components than unknowns."""
+
+    def flat(*inputs: Tensor) -> Tensor:
+        return residual(*inputs).reshape(-1)
+
+    blocks = torch.func.vmap(torch.func.jacfwd(flat, argnums=tuple(range(count))))(*arguments)
+    return torch.cat([block.flatten(2) for block in blocks], dim=2)
