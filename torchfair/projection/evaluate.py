@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 import torch
 
+from ..errors import TorchfairError
 from .layout import State
 from .result import TermResidual
+from .system import LinearSystem, Structure
 from .term import ElementTerm
 
 
@@ -48,3 +50,31 @@ def first_bad_elements(term: ElementTerm, state: State) -> list[int]:
     values, jacobians = term.derivatives(term.arguments(state))
     bad = ~(torch.isfinite(values).all(1) & torch.isfinite(jacobians).flatten(1).all(1))
     return [int(i) for i in torch.nonzero(bad).squeeze(1)]
+
+
+def check_start(terms: Sequence[ElementTerm], state: State, value: float) -> None:
+    """Raises TorchfairError if the state or its merit ``value`` is not finite; names the block or the term."""
+    for name, block in state.items():
+        bad = torch.nonzero(~torch.isfinite(block).all(1)).squeeze(1).tolist()
+        if bad:
+            raise TorchfairError(f"block '{name}' is not finite in rows {bad[:5]}: repair the start")
+    if value != float("inf"):
+        return
+    for term in terms:
+        bad = first_bad_elements(term, state) if term.num_elements and term.weight else []
+        if bad:
+            raise TorchfairError(
+                f"the residual of term '{term.name}' is not finite at the start, elements {bad[:5]}: "
+                "move the start away from the singular place or leave these elements out"
+            )
+    raise TorchfairError("the merit overflows at the start although every residual is finite: lower the weights")
+
+
+def culprit(structure: Structure, system: LinearSystem, state: State) -> str:
+    """The term that most likely makes the system singular: one that is not finite, or the stiffest."""
+    sizes = [float(torch.nan_to_num(j, nan=float("inf")).abs().max()) for j in system.jacobians]
+    worst = max(range(len(sizes)), key=sizes.__getitem__)
+    term = structure.compiled[worst].term
+    bad = first_bad_elements(term, state)
+    where = f", not finite at elements {bad[:5]}" if bad else f", largest derivative {sizes[worst]:.3g}"
+    return f"term '{term.name}'{where}"

@@ -45,19 +45,15 @@ class Layout:
 
     def offset(self, name: str) -> int:
         """Position of the first unknown of a block."""
-        return self._before(name, lambda n, d: n * d)
+        return sum(n * d for n, d in self._sizes_before(name))
 
     def node_offset(self, name: str) -> int:
         """Number of the first node of a block."""
-        return self._before(name, lambda n, d: n)
+        return sum(n for n, _ in self._sizes_before(name))
 
-    def _before(self, name: str, count: object) -> int:
-        total = 0
-        for other, (n, d) in self.sizes.items():
-            if other == name:
-                return total
-            total += count(n, d)  # type: ignore[operator]
-        raise KeyError(name)
+    def _sizes_before(self, name: str) -> list[tuple[int, int]]:
+        names = list(self.sizes)
+        return [self.sizes[other] for other in names[: names.index(name)]]
 
     def flatten(self, state: State) -> Tensor:
         """Blocks as one vector."""
@@ -65,17 +61,19 @@ class Layout:
 
     def unflatten(self, flat: Tensor) -> dict[str, Tensor]:
         """One vector as blocks (views)."""
-        parts = torch.split(flat, [n * d for n, d in self.sizes.values()])  # type: ignore[no-untyped-call]
+        parts = torch.split(flat, [n * d for n, d in self.sizes.values()])
         return {name: part.view(n, d) for (name, (n, d)), part in zip(self.sizes.items(), parts, strict=True)}
 
     def free_mask(self, fixed: Mapping[str, Tensor], device: torch.device) -> Tensor:
-        """True where an unknown may move; ``fixed`` holds masks ``(n,)`` or ``(n, d)`` that are True where it may not."""
+        """True where an unknown may move; the masks ``(n,)`` or ``(n, d)`` in ``fixed`` are True where it may not."""
         free = {name: torch.ones(size, dtype=torch.bool, device=device) for name, size in self.sizes.items()}
         for name, mask in fixed.items():
             if name not in self.sizes:
                 raise ShapeError("fixed", f"block names among {list(self.sizes)}", f"'{name}'")
             n, d = self.sizes[name]
             if mask.dtype != torch.bool or tuple(mask.shape) not in ((n,), (n, d)):
-                raise ShapeError(f"fixed['{name}']", f"a bool mask ({n},) or ({n}, {d})", f"{tuple(mask.shape)} {mask.dtype}")
+                raise ShapeError(
+                    f"fixed['{name}']", f"a bool mask ({n},) or ({n}, {d})", f"{tuple(mask.shape)} {mask.dtype}"
+                )
             free[name] &= ~(mask[:, None] if mask.ndim == 1 else mask).to(device)
         return self.flatten(free)

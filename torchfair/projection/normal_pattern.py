@@ -98,7 +98,7 @@ class NormalPattern:
     def _build_scatter(self) -> Tensor | None:
         """The fixed matrix that sums products of Jacobian entries of the non-linear terms."""
         positions, factors = [], []
-        for nodes, widths, unknowns, linear in self._terms:
+        for nodes, widths, _, linear in self._terms:
             if linear:
                 continue
             place, factor = self._product_positions(nodes.cpu().numpy(), widths)

@@ -21,6 +21,9 @@ class ProjectionSettings:
         step_tolerance: Stop when an accepted step is below this, relative to the size of the unknowns.
         merit_tolerance: Stop when the merit fell by less than this fraction over ``patience`` steps.
         patience: See ``merit_tolerance``.
+        least_extrapolation: A step that gained more than predicted is tried again at the length at which a
+            parabola through what was seen is smallest, if that is more than this many times longer;
+            infinity never tries.
         time_limit: Seconds, or None.
         accuracy: Relative remainder with which an iterative linear solver starts; tightened as the merit
             settles.
@@ -34,6 +37,7 @@ class ProjectionSettings:
     step_tolerance: float = 1e-10
     merit_tolerance: float = 1e-9
     patience: int = 3
+    least_extrapolation: float = 1.25
     time_limit: float | None = None
     accuracy: float = 1e-2
     solver: str | LinearSolver = "auto"

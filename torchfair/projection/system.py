@@ -24,7 +24,6 @@ class CompiledTerm:
     """
 
     def __init__(self, term: ElementTerm, layout: Layout) -> None:
-        term.check(layout)
         self.term = term
         unknowns, nodes, self.widths = [], [], []
         for name, index in term.stencil:
@@ -42,6 +41,8 @@ class Structure:
     """Everything about a problem that does not change with the state: numbering, sparsity, index maps."""
 
     def __init__(self, layout: Layout, terms: Sequence[ElementTerm], free: Tensor, dtype: torch.dtype) -> None:
+        for term in terms:
+            term.check(layout)
         self.layout = layout
         self.compiled = [CompiledTerm(term, layout) for term in terms if term.num_elements and term.weight > 0]
         self.free = free
@@ -82,7 +83,9 @@ class Structure:
             counts = [torch.full((m * n,), k, device=self.free.device) for m, k, n in key]
             offsets = torch.zeros(sum(c.shape[0] for c in counts) + 1, dtype=torch.int64, device=self.free.device)
             torch.cumsum(torch.cat(counts), 0, out=offsets[1:])
-            columns = [c.unknowns.T.expand(m, -1, -1).reshape(-1) for c, (m, _, _) in zip(self.compiled, key, strict=True)]
+            columns = [
+                c.unknowns.T.expand(m, -1, -1).reshape(-1) for c, (m, _, _) in zip(self.compiled, key, strict=True)
+            ]
             self._rows = (offsets.to(torch.int32), torch.cat(columns).to(torch.int32))
             self._rows_key = key
             self._transpose: tuple[Tensor, Tensor, Tensor] | None = None
@@ -148,7 +151,11 @@ class LinearSystem:
 
     @cached_property
     def diagonal(self) -> Tensor:
-        """Diagonal of ``J^T J``; zero at fixed unknowns and at unknowns that no term feels."""
+        """Diagonal of ``J^T J``; zero at fixed unknowns and at unknowns that no term feels.
+
+        Used for scaling only: where an element names a node twice, the mixed products are left out, here
+        and in :attr:`diagonal_blocks`.
+        """
         local = [j.square().sum(0).reshape(-1) for j in self.jacobians]
         return self.structure.unknown_scatter @ torch.cat(local)
 
@@ -159,7 +166,9 @@ class LinearSystem:
         widths = {width for _, width in layout.sizes.values()}
         sums: dict[int, Tensor] = {}
         for width in widths:
-            parts = [self._local_blocks(c, j, width) for c, j in zip(self.structure.compiled, self.jacobians, strict=True)]
+            parts = [
+                self._local_blocks(c, j, width) for c, j in zip(self.structure.compiled, self.jacobians, strict=True)
+            ]
             sums[width] = (self.structure.node_scatter @ torch.cat(parts)).view(-1, width, width)
         blocks = {}
         for name, (count, width) in layout.sizes.items():

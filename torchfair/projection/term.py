@@ -74,7 +74,9 @@ class ElementTerm:
                 raise ShapeError(what, f"blocks among {list(layout.sizes)}", f"'{name}'")
             rows = layout.sizes[name][0]
             if index.ndim != 2 or index.is_floating_point() or index.shape[0] != self.num_elements:
-                raise ShapeError(f"{what}, stencil of '{name}'", f"indices ({self.num_elements}, k)", tuple(index.shape))
+                raise ShapeError(
+                    f"{what}, stencil of '{name}'", f"indices ({self.num_elements}, k)", tuple(index.shape)
+                )
             if index.numel() and (int(index.min()) < 0 or int(index.max()) >= rows):
                 raise ShapeError(f"{what}, stencil of '{name}'", f"indices in 0..{rows - 1}", "indices outside")
         for tensor in (*self.data, *(() if self.element_weights is None else (self.element_weights,))):

@@ -24,9 +24,15 @@ class Step(NamedTuple):
 
 
 class LinearSolver(Protocol):
-    """Solves the damped normal equations of one structure again and again."""
+    """Solves the damped normal equations of one structure again and again.
+
+    Attributes:
+        name: For reports.
+        inexact: Whether :meth:`solve` heeds ``accuracy``.
+    """
 
     name: str
+    inexact: bool
 
     def prepare(self, structure: Structure) -> None:
         """Symbolic work, once for each structure."""

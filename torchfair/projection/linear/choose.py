@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import torch
 
 from ..system import Structure
@@ -28,7 +30,12 @@ def choose_solver(name: str, structure: Structure) -> LinearSolver:
     Raises:
         ValueError: unknown name, or rslab is asked for and not installed.
     """
-    makers = {"dense": DenseQR, "scipy": ScipyDirect, "rslab": RslabDirect, "cg": ConjugateGradients}
+    makers: dict[str, Callable[[], LinearSolver]] = {
+        "dense": DenseQR,
+        "scipy": ScipyDirect,
+        "rslab": RslabDirect,
+        "cg": ConjugateGradients,
+    }
     if name == "auto":
         name = _automatic(structure.num_unknowns, structure.free.device)
     if name not in makers:

@@ -20,6 +20,7 @@ class ConjugateGradients:
     """
 
     name = "conjugate gradients"
+    inexact = True
 
     def __init__(self, max_iterations: int = 500, tightest: float = 1e-10) -> None:
         self.max_iterations = max_iterations
@@ -75,4 +76,5 @@ def invert(blocks: Tensor) -> Tensor:
         a, b, c = blocks.unbind(-2)
         adjugate = torch.stack([torch.linalg.cross(b, c), torch.linalg.cross(c, a), torch.linalg.cross(a, b)], dim=-1)
         return adjugate / (a * adjugate[..., 0]).sum(-1)[..., None, None]
-    return torch.linalg.inv(blocks)
+    inverse: Tensor = torch.linalg.inv(blocks)
+    return inverse

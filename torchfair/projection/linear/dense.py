@@ -18,6 +18,7 @@ class DenseQR:
     """
 
     name = "dense"
+    inexact = False
 
     def prepare(self, structure: Structure) -> None:
         """Nothing to prepare."""

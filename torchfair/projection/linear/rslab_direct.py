@@ -18,6 +18,7 @@ class RslabDirect:
     """
 
     name = "rslab"
+    inexact = False
 
     @staticmethod
     def available() -> bool:

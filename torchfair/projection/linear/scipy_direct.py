@@ -17,6 +17,7 @@ class ScipyDirect:
     """
 
     name = "scipy"
+    inexact = False
 
     def prepare(self, structure: Structure) -> None:
         """Builds the full symmetric pattern."""

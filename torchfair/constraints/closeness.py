@@ -1,0 +1,75 @@
+"""Vertices stay near a reference surface (paper section 5.1: tangent planes, refreshed as iteration goes on)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from ..geometry.closest_point import ReferenceSurface
+from ..projection import ElementTerm
+from ..projection.layout import State
+from .barrier import barrier
+
+Feet = Callable[[State], tuple[Tensor, Tensor]]
+
+
+class TangentPlanes:
+    """Closest points on a reference surface and the normals of the planes that stand for it there.
+
+    The normal points from the closest point to the vertex where they differ, so that the distance to the
+    plane, its gradient and the true distance agree; on the surface it is the interpolated vertex normal.
+    The last query is kept, since several terms ask for the same state.
+    """
+
+    def __init__(self, reference: ReferenceSurface, block: str = "vertices") -> None:
+        self.reference, self.block = reference, block
+        self._points: Tensor | None = None
+        self._answer: tuple[Tensor, Tensor] | None = None
+
+    def __call__(self, state: State) -> tuple[Tensor, Tensor]:
+        """Closest points ``(V, 3)`` and unit normals ``(V, 3)`` for all vertices of the state."""
+        points = state[self.block]
+        if self._points is not None and self._answer is not None and torch.equal(self._points, points):
+            return self._answer
+        closest = self.reference.closest(points)
+        away = points - closest.positions
+        distance = closest.distances[:, None]
+        smooth = closest.smooth_normals
+        side = torch.where((away * smooth).sum(1, keepdim=True) < 0.0, -1.0, 1.0).to(points.dtype)
+        far = distance > 1e-9
+        normals = torch.where(far, side * away / torch.where(far, distance, torch.ones_like(distance)), smooth)
+        self._points, self._answer = points.clone(), (closest.positions, normals)
+        return self._answer
+
+
+def plane_distance(x: Tensor, foot: Tensor, normal: Tensor) -> Tensor:
+    """Signed distance of the vertex ``x`` (1, 3) from the plane through ``foot``."""
+    return torch.dot(normal, x[0] - foot)
+
+
+def closeness_terms(planes: TangentPlanes, count: int, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
+    """Distance of every vertex from the reference surface, in the unit of the vertices."""
+    stencil = [(block, _each(count, planes))]
+    return [ElementTerm("closeness", plane_distance, stencil, weight=weight, refresh=planes)]
+
+
+def distance_limit_terms(
+    planes: TangentPlanes, limits: Tensor, *, weight: float, block: str = "vertices"
+) -> list[ElementTerm]:
+    """Barrier that no vertex crosses: ``limits`` (V,) are the largest distances allowed; silent below half of it."""
+
+    def limit(x: Tensor, foot: Tensor, normal: Tensor, most: Tensor) -> Tensor:
+        return barrier(most - plane_distance(x, foot, normal).abs(), 0.5 * most)
+
+    def refresh(state: State) -> tuple[Tensor, Tensor, Tensor]:
+        return (*planes(state), limits)
+
+    return [
+        ElementTerm("distance limit", limit, [(block, _each(limits.shape[0], planes))], weight=weight, refresh=refresh)
+    ]
+
+
+def _each(count: int, planes: TangentPlanes) -> Tensor:
+    return torch.arange(count)[:, None]

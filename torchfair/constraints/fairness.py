@@ -1,0 +1,55 @@
+"""Fairness: vertices stay evenly spread (umbrella vectors, second differences of mesh polylines)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from ..polylines import straight_triples
+from ..projection import ElementTerm
+from ..topology import Topology
+
+
+def umbrella(x: Tensor) -> Tensor:
+    """Mean of the neighbours ``x[1:]`` minus the vertex ``x[0]`` (Kobbelt et al. 1998)."""
+    return x[1:].mean(0) - x[0]
+
+
+def second_difference(x: Tensor) -> Tensor:
+    """Half the second difference ``(x[0] - 2 x[1] + x[2]) / 2``: an umbrella of two neighbours."""
+    return 0.5 * (x[0] + x[2]) - x[1]
+
+
+def interior_fairness_terms(topology: Topology, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
+    """Second differences at interior vertices between four quads, umbrella vectors at the others."""
+    in_grid = _between_quads(topology)
+    triples = straight_triples(topology)
+    triples = triples[in_grid[triples[:, 1]]]
+    terms = []
+    if triples.numel():
+        terms.append(ElementTerm("fairness", second_difference, [(block, triples)], weight=weight, linear=True))
+    for centres, ring in topology.rings_by_valence.values():
+        chosen = ~in_grid[centres]
+        if bool(chosen.any()):
+            stencil = torch.cat([centres[:, None], ring], dim=1)[chosen]
+            terms.append(ElementTerm("fairness", umbrella, [(block, stencil)], weight=weight, linear=True))
+    return terms
+
+
+def boundary_fairness_terms(
+    topology: Topology, corners: Tensor, *, weight: float, block: str = "vertices"
+) -> list[ElementTerm]:
+    """Second differences along the boundary, except at ``corners`` (V,) bool: keeps gliding vertices apart."""
+    triples = straight_triples(topology, corners=corners)
+    triples = triples[topology.is_boundary_vertex[triples[:, 1]]]
+    if not triples.numel():
+        return []
+    return [ElementTerm("boundary fairness", second_difference, [(block, triples)], weight=weight, linear=True)]
+
+
+def _between_quads(topology: Topology) -> Tensor:
+    """(V,) whether a vertex is interior, of valence 4 and has only quads around it."""
+    quads_at = torch.zeros(topology.num_vertices, dtype=torch.int64, device=topology.device)
+    is_quad = (topology.face_sizes[topology.corner_faces] == 4).to(torch.int64)
+    quads_at.index_add_(0, topology.corners, is_quad)
+    return (quads_at == 4) & (topology.valences == 4) & ~topology.is_boundary_vertex

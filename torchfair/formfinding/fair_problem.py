@@ -1,0 +1,199 @@
+"""The terms, fixed vertices and guards of the job that lowers E."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import torch
+from torch import Tensor
+
+from .. import constraints as c
+from ..boundary import boundary_corners, boundary_pieces
+from ..constraints.closeness import TangentPlanes
+from ..constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
+from ..errors import MeshError
+from ..geometry import corner_angles, degenerate_faces, face_areas, face_normals
+from ..geometry.closest_curve_point import ReferenceCurves
+from ..geometry.closest_point import ReferenceSurface
+from ..geometry.planarity import planarity
+from ..projection import ElementTerm
+from ..projection.layout import State
+from ..topology import Topology
+from .settings import FairSettings
+
+_SAFE_ANGLE = math.radians(25.0)
+_LEAST_SAFETY = math.radians(2.0)
+
+
+class FairProblem:
+    """Everything guided projection needs to lower E of one normalised mesh.
+
+    Attributes:
+        start: Variable blocks.
+        terms: Element terms.
+        fixed: Masks of unknowns that do not move.
+        planar_faces: (n,) faces that are kept planar.
+        notes: Decisions taken, in words.
+    """
+
+    def __init__(
+        self,
+        vertices: Tensor,
+        topology: Topology,
+        reference: tuple[Tensor, Topology] | None,
+        targets: dict[int, Tensor],
+        settings: FairSettings,
+    ) -> None:
+        self.vertices, self.topology, self.settings = vertices, topology, settings
+        self.notes: list[str] = []
+        self._refuse_degenerate_faces()
+        self.reference = ReferenceSurface(*(reference or (vertices, topology)))
+        self._planes = TangentPlanes(self.reference)
+        self.handles = torch.tensor(list(targets), dtype=torch.int64)
+        self.targets = torch.stack(list(targets.values())) if targets else torch.zeros(0, 3, dtype=vertices.dtype)
+        self.design_mode = self._leaves_reference()
+        self.corners = boundary_corners(vertices, topology, settings.corner_angle)
+        self.corners[self.handles] = False
+        self.fixed = {"vertices": self._fixed_vertices()[:, None].expand(-1, 3).clone()}
+        self.planar_faces = self._choose_planar_faces()
+        self.start, target_terms = self._energy()
+        self.terms = [
+            *target_terms,
+            *self._closeness(),
+            *self._boundary(),
+            *c.handle_terms(self.handles, self.targets, weight=settings.handle_weight),
+            *c.planarity_terms(topology, self.planar_faces, weight=settings.planarity_weight),
+            *c.interior_fairness_terms(topology, weight=settings.fairness_weight),
+            *self._quality(),
+        ]
+
+    # ---- decisions -------------------------------------------------------------------------------------
+
+    def _refuse_degenerate_faces(self) -> None:
+        bad = torch.nonzero(degenerate_faces(self.vertices, self.topology)).squeeze(1).tolist()
+        if bad:
+            raise MeshError(
+                f"{len(bad)} face(s) have no area: faces {bad[:5]}. Remove them or move their vertices apart first."
+            )
+
+    def _leaves_reference(self) -> bool:
+        limit = self.settings.distance_limit
+        if not self.handles.numel() or limit is None:
+            return False
+        farthest = float(self.reference.closest(self.targets).distances.max())
+        if farthest <= limit:
+            return False
+        self.notes.append(
+            f"a handle pulls {farthest:.3g} mean edge lengths off the reference surface: closeness and the "
+            "distance limit are switched off (design mode)"
+        )
+        return True
+
+    def _fixed_vertices(self) -> Tensor:
+        isolated = self.topology.valences == 0
+        kinds = {
+            "glide": self.topology.is_boundary_vertex & self.corners,
+            "fixed": self.topology.is_boundary_vertex.clone(),
+            "free": torch.zeros_like(isolated),
+        }
+        fixed = kinds[self.settings.boundary] | isolated
+        fixed[self.handles] = False
+        return fixed
+
+    def _choose_planar_faces(self) -> Tensor:
+        polygons = self.topology.face_sizes > 3
+        chosen = self.settings.planar
+        if not isinstance(chosen, str):
+            faces = torch.tensor(chosen, dtype=torch.int64)
+            if faces.numel() and not bool(((faces >= 0) & (faces < self.topology.num_faces)).all()):
+                raise MeshError(
+                    f"planar: face numbers run from 0 to {self.topology.num_faces - 1}, got {list(chosen)[:5]}"
+                )
+            return faces
+        if chosen == "keep":
+            polygons = polygons & (planarity(self.vertices, self.topology) < self.settings.planar_tolerance)
+        elif chosen == "none":
+            polygons = torch.zeros_like(polygons)
+        faces = torch.nonzero(polygons).squeeze(1)
+        if faces.numel():
+            self.notes.append(f"{faces.numel()} of {self.topology.num_faces} faces are kept planar")
+        return faces
+
+    # ---- terms -----------------------------------------------------------------------------------------
+
+    def _energy(self) -> tuple[dict[str, Tensor], list[ElementTerm]]:
+        settings = self.settings
+        if settings.formulation == "reduced":
+            terms = c.normal_variation_terms(self.topology, smoothing=settings.smoothing, weight=settings.energy_weight)
+            return {"vertices": self.vertices}, terms
+        planar = self.topology.face_sizes == 3
+        planar[self.planar_faces] = True
+        terms = lifted_normal_variation_terms(
+            self.vertices,
+            self.topology,
+            planar,
+            weight=settings.energy_weight,
+            constraint_weight=settings.constraint_weight,
+        )
+        return {"vertices": self.vertices, **lifted_blocks(self.vertices, self.topology)}, terms
+
+    def _closeness(self) -> list[ElementTerm]:
+        if self.design_mode:
+            return []
+        used = self.topology.valences > 0
+        terms = c.closeness_terms(self._planes, self.topology.num_vertices, weight=self.settings.closeness_weight)
+        if self.settings.distance_limit is not None:
+            distances = self.reference.closest(self.vertices).distances
+            limits = distances.clamp_min(self.settings.distance_limit)
+            far = int((distances > self.settings.distance_limit)[used].sum())
+            if far:
+                self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")
+            terms += c.distance_limit_terms(self._planes, limits, weight=self.settings.quality_weight)
+        return terms
+
+    def _boundary(self) -> list[ElementTerm]:
+        if self.settings.boundary != "glide":
+            return []
+        vertices, owners, curves, closed = [], [], [], []
+        for number, piece in enumerate(boundary_pieces(self.topology, self.corners)):
+            gliding = piece.vertices[~self.corners[piece.vertices]]
+            gliding = gliding[~torch.isin(gliding, self.handles)]
+            vertices.append(gliding)
+            owners.append(torch.full_like(gliding, number))
+            curves.append(self.vertices[piece.vertices])
+            closed.append(piece.closed)
+        if not curves:
+            return []
+        terms = c.gliding_terms(
+            ReferenceCurves(curves, closed),
+            torch.cat(vertices),
+            torch.cat(owners),
+            weight=self.settings.boundary_weight,
+        )
+        return terms + c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight)
+
+    def _quality(self) -> list[ElementTerm]:
+        settings = self.settings
+        angles = corner_angles(self.vertices, self.topology)
+        smallest = min(settings.smallest_angle, float(angles.min()) * (1.0 - 1e-9))
+        safe = angles.clamp(max=max(_SAFE_ANGLE, 2.0 * smallest)).clamp_min(smallest + _LEAST_SAFETY)
+        weight = settings.quality_weight
+        return [
+            *c.corner_angle_terms(self.topology, smallest, safe, weight=weight),
+            *c.face_area_terms(
+                self.topology, face_areas(self.vertices, self.topology), smallest=settings.smallest_area, weight=weight
+            ),
+        ]
+
+    # ---- guard -----------------------------------------------------------------------------------------
+
+    @cached_property
+    def _normals(self) -> Tensor:
+        return face_normals(self.vertices, self.topology)
+
+    def keeps_faces(self, state: State, trial: State) -> bool:
+        """Whether no face turns over: against the start, or in design mode against the last state."""
+        before = face_normals(state["vertices"], self.topology) if self.design_mode else self._normals
+        after = face_normals(trial["vertices"], self.topology)
+        return bool(((before * after).sum(1) > 0.0).all())

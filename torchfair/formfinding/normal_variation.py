@@ -1,0 +1,125 @@
+"""Smoother meshes near a reference surface: lowers E by sliding vertices (paper section 5.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from ..energies import normal_variation
+from ..errors import MeshError, ShapeError
+from ..projection import ProjectionResult, guided_projection
+from ..projection.iteration import Callback
+from ..projection.layout import State
+from ..projection.normalisation import Normalisation
+from ..topology import Topology
+from .fair_problem import FairProblem
+from .fair_report import fair_measures
+from .settings import FairSettings
+
+Mesh = tuple[Tensor, Topology]
+
+
+@dataclass(frozen=True)
+class FairResult:
+    """A mesh of lower E.
+
+    Attributes:
+        vertices: (V, 3) in the unit and dtype of the input.
+        projection: Status, history and residual table of the iteration, in normalised units
+            (energies in the history are in the unit of the input).
+        before, after: Energies and the quantities that the job guarantees, see ``fair_measures``.
+        notes: What the job decided on its own, in words.
+    """
+
+    vertices: Tensor
+    projection: ProjectionResult
+    before: dict[str, float]
+    after: dict[str, float]
+    notes: list[str]
+
+
+def minimise_normal_variation(
+    vertices: Tensor,
+    topology: Topology,
+    *,
+    reference: Mesh | None = None,
+    handles: Mapping[int, Sequence[float]] | None = None,
+    settings: FairSettings | None = None,
+    callback: Callback | None = None,
+) -> FairResult:
+    """Moves vertices along a reference surface so that E = sum l l* becomes small.
+
+    Works on triangle, quad and hybrid polygon meshes, with or without boundary. Guarantees at every step:
+    the merit never increases; no vertex goes farther from the reference surface than
+    ``settings.distance_limit``; no corner angle and no face area falls below its bound; no face flips. The
+    problem is solved centred and with unit mean edge length, so results do not depend on the unit.
+
+    Args:
+        vertices: (V, 3).
+        topology: Connectivity; it does not change.
+        reference: Surface to stay close to, by default the input itself. Vertices that start farther from
+            it than the limit may not go farther away than they are.
+        handles: Targets by vertex number. Where a target is farther from the reference surface than the
+            limit, the reference is given up (design mode, paper Fig. 12) and a note says so.
+        settings: Weights, bounds and tolerances.
+        callback: Called with every iteration record, whose quantities hold ``normal_variation``; returning
+            True stops. Ctrl-C returns the best mesh so far.
+
+    Raises:
+        ShapeError: vertices are not ``(V, 3)``, or a handle is not a point.
+        MeshError: vertices are not finite, a face has no area, or a handle is no vertex.
+    """
+    settings = settings or FairSettings()
+    topology.check_vertices(vertices)
+    if vertices.ndim != 2:
+        raise ShapeError("vertices", f"({topology.num_vertices}, 3), one mesh", tuple(vertices.shape))
+    start = vertices.detach().to("cpu", torch.float64)
+    topology = topology.to("cpu")
+    normalisation = Normalisation.of(start, topology)
+    problem = FairProblem(
+        normalisation.apply(start),
+        topology,
+        None
+        if reference is None
+        else (normalisation.apply(reference[0].detach().to("cpu", torch.float64)), reference[1]),
+        _targets(handles or {}, topology, normalisation),
+        settings,
+    )
+
+    def observe(state: State) -> dict[str, float]:
+        return {"normal_variation": normalisation.length * float(normal_variation(state["vertices"], topology))}
+
+    result = guided_projection(
+        problem.start,
+        problem.terms,
+        fixed=problem.fixed,
+        settings=settings.projection,
+        callback=callback,
+        observe=observe,
+        guard=problem.keeps_faces,
+    )
+    moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(result.blocks["vertices"]))
+    return FairResult(
+        vertices=moved.to(vertices),
+        projection=result,
+        before=fair_measures(start, start, topology, problem, normalisation),
+        after=fair_measures(moved, start, topology, problem, normalisation),
+        notes=problem.notes,
+    )
+
+
+def _targets(
+    handles: Mapping[int, Sequence[float]], topology: Topology, normalisation: Normalisation
+) -> dict[int, Tensor]:
+    targets = {}
+    for vertex, target in handles.items():
+        point = torch.as_tensor(target, dtype=torch.float64)
+        if point.shape != (3,) or not bool(torch.isfinite(point).all()):
+            raise ShapeError(f"handle {vertex}", "three finite coordinates", target)
+        if not 0 <= vertex < topology.num_vertices:
+            raise MeshError(f"handle {vertex} is no vertex: numbers run from 0 to {topology.num_vertices - 1}")
+        targets[vertex] = normalisation.apply(point)
+    return targets

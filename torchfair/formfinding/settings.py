@@ -1,0 +1,78 @@
+"""Settings of the formfinding job that lowers E."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from ..projection import ProjectionSettings
+
+BOUNDARIES = ("glide", "fixed", "free")
+PLANAR = ("keep", "quads", "none")
+FORMULATIONS = ("reduced", "lifted")
+
+
+def _default_projection() -> ProjectionSettings:
+    return ProjectionSettings(
+        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=2e-4, patience=4
+    )
+
+
+@dataclass(frozen=True)
+class FairSettings:
+    """What :func:`minimise_normal_variation` trades against what. Lengths are in mean edge lengths of the input.
+
+    Attributes:
+        energy_weight: Weight of E.
+        closeness_weight: Weight of the squared distance from the reference surface; 0 switches it off.
+        distance_limit: No vertex goes farther from the reference surface than this; None for no limit.
+        fairness_weight: Weight of squared second differences and umbrella vectors.
+        handle_weight: Weight of the squared distance of handles from their targets.
+        boundary: ``"glide"`` lets boundary vertices slide on the boundary curve and keeps its corners,
+            ``"fixed"`` keeps them where they are, ``"free"`` leaves them to closeness alone.
+        boundary_weight: Weight of the squared distance from the boundary curve.
+        corner_angle: The boundary has a corner where it turns by more than this, radians.
+        planar: ``"keep"`` for the polygons that arrive planar, ``"quads"`` for all polygons with more than
+            three corners, ``"none"``, or face numbers.
+        planar_tolerance: A polygon arrives planar when its diagonals are nearer than this fraction of its
+            mean edge length.
+        planarity_weight: Weight of the squared distance of diagonals.
+        smallest_angle: No corner angle falls below this (or below the smallest of the input), radians.
+        smallest_area: No face falls below this fraction of its area.
+        quality_weight: Weight of the barriers before those bounds.
+        smoothing: ``l l*`` below this is treated as flat.
+        formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables too.
+        constraint_weight: Weight of the constraints that define the auxiliary variables.
+        projection: Iterations, tolerances, damping and linear solver.
+    """
+
+    energy_weight: float = 1.0
+    closeness_weight: float = 100.0
+    distance_limit: float | None = 0.05
+    fairness_weight: float = 0.3
+    handle_weight: float = 1e4
+    boundary: str = "glide"
+    boundary_weight: float = 1e4
+    corner_angle: float = math.radians(40.0)
+    planar: str | tuple[int, ...] = "keep"
+    planar_tolerance: float = 1e-3
+    planarity_weight: float = 1e4
+    smallest_angle: float = math.radians(10.0)
+    smallest_area: float = 0.2
+    quality_weight: float = 0.1
+    smoothing: float = 1e-2
+    formulation: str = "reduced"
+    constraint_weight: float = 1e3
+    projection: ProjectionSettings = field(default_factory=_default_projection)
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("boundary", BOUNDARIES), ("formulation", FORMULATIONS)):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+        if isinstance(self.planar, str) and self.planar not in PLANAR:
+            raise ValueError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
+        if self.distance_limit is not None and not self.distance_limit > 0.0:
+            raise ValueError(f"distance_limit must be positive or None, got {self.distance_limit}")
+        weights = [name for name in vars(self) if name.endswith("_weight") and not getattr(self, name) >= 0.0]
+        if weights:
+            raise ValueError(f"weights must be at least 0: {', '.join(weights)}")

@@ -1,0 +1,206 @@
+"""One run of the damped iteration: the current state, the damping and the history."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+
+from ..errors import SingularSystemError
+from .damping import Damping
+from .evaluate import check_start, culprit, merit, residual_table
+from .layout import State
+from .linear import Step
+from .result import IterationRecord, ProjectionResult, Status
+from .settings import ProjectionSettings
+from .system import LinearSystem
+
+if TYPE_CHECKING:
+    from .guided_projection import GuidedProjection
+
+Callback = Callable[[IterationRecord], object]
+Observe = Callable[[State], dict[str, float]]
+Guard = Callable[[State, State], bool]
+
+_LEAST_GAIN = 1e-4
+_TIGHTEST_ACCURACY = 1e-8
+_LONGEST_EXTRAPOLATION = 3.0
+
+
+class Iteration:
+    """One run; make it, call :meth:`run` once."""
+
+    def __init__(
+        self,
+        problem: GuidedProjection,
+        blocks: State,
+        settings: ProjectionSettings,
+        callback: Callback | None,
+        observe: Observe | None,
+        guard: Guard | None,
+    ) -> None:
+        self.problem, self.settings = problem, settings
+        self.callback, self.observe, self.guard = callback, observe, guard
+        self.begin = time.perf_counter()
+        self.timings = {"linearise": 0.0, "solve": 0.0, "merit": 0.0}
+        self.state: dict[str, Tensor] = {name: block.detach().clone() for name, block in blocks.items()}
+        self.merit = self._merit(self.state)
+        check_start(problem.terms, self.state, self.merit)
+        self.initial_residuals = residual_table(problem.terms, self.state)
+        self.damping = Damping(settings.initial_damping)
+        self.accuracy = settings.accuracy
+        self.quantities: dict[str, float] = {}
+        self.history: list[IterationRecord] = []
+        self.recent: list[float] = []
+
+    def run(self) -> ProjectionResult:
+        """Iterates until a tolerance, a limit, the callback or an interruption ends it."""
+        detail = ""
+        try:
+            start = IterationRecord(0, self.merit, math.nan, math.nan, 0.0, math.nan, True, 0, 0.0)
+            if self._record(start):
+                status = Status.CALLBACK
+            elif self.merit == 0.0:
+                status = Status.ZERO_MERIT
+            else:
+                self.problem.prepare()
+                status, detail = self._iterate()
+        except KeyboardInterrupt:
+            status = Status.INTERRUPTED
+        return ProjectionResult(
+            blocks=self.state,
+            status=status,
+            message=f"{status.value}; {detail}" if detail else status.value,
+            residuals=residual_table(self.problem.terms, self.state),
+            initial_residuals=self.initial_residuals,
+            history=self.history,
+            solver=self.problem.solver.name,
+            timings={**self.timings, "total": self._elapsed()},
+        )
+
+    def _iterate(self) -> tuple[Status, str]:
+        number = 0
+        while True:
+            with self._timed("linearise"):
+                system = self.problem.structure.linearise(self.state)
+                scale = self._scale(system)
+            gradient = float((system.gradient.abs() / scale.sqrt()).max())
+            if gradient <= self.settings.gradient_tolerance:
+                return Status.GRADIENT_TOLERANCE, ""
+            accepted = False
+            while not accepted:
+                if number >= self.settings.max_iterations:
+                    return Status.MAX_ITERATIONS, ""
+                if self.settings.time_limit is not None and self._elapsed() > self.settings.time_limit:
+                    return Status.TIME_LIMIT, ""
+                step = self._damped_step(system, scale)
+                if step is None:
+                    return Status.SINGULAR, culprit(self.problem.structure, system, self.state)
+                number += 1
+                accepted, status = self._try(system, scale, step, number, gradient)
+                if status is not None:
+                    return status, ""
+
+    def _damped_step(self, system: LinearSystem, scale: Tensor) -> Step | None:
+        """A solution of the damped system; None where it is singular at every damping."""
+        while True:
+            try:
+                with self._timed("solve"):
+                    return self.problem.solver.solve(system, self.damping.value * scale, self.accuracy)
+            except SingularSystemError:
+                if not self.damping.reject():
+                    return None
+
+    def _try(
+        self, system: LinearSystem, scale: Tensor, step: Step, number: int, gradient: float
+    ) -> tuple[bool, Status | None]:
+        """Takes the step if it lowers the merit; says whether it did, and why to stop."""
+        damping, before = self.damping.value, self.merit
+        change = step.change * self.problem.structure.free
+        predicted = 0.5 * float(change @ (damping * scale * change - system.gradient + step.remainder))
+        flat = self.problem.layout.flatten(self.state)
+        trial, value = self._evaluate(flat + change)
+        gain = (before - value) / predicted if predicted > 0.0 else -math.inf
+        accepted = value < before and gain > _LEAST_GAIN
+        size, reach = float(change.abs().max()), float(flat.abs().max())
+        if accepted:
+            self.state, self.merit = trial, value
+            self._extrapolate(flat, change, gain)
+            self.damping.accept(gain)
+        record = IterationRecord(
+            number, self.merit, damping, gain, size, gradient, accepted, step.iterations, self._elapsed()
+        )
+        if self._record(record):
+            return accepted, Status.CALLBACK
+        if size <= self.settings.step_tolerance * (reach + self.settings.step_tolerance):
+            return accepted, Status.STEP_TOLERANCE if accepted else Status.STALLED
+        if accepted:
+            return True, self._settled(before)
+        return False, None if self.damping.reject() else Status.STALLED
+
+    def _extrapolate(self, flat: Tensor, change: Tensor, gain: float) -> None:
+        """Goes on along a step that gained more than predicted, to the minimum of the parabola seen.
+
+        A reweighted model lies above the merit: with a gain of 1.5 its curvature is twice too large, and
+        the best step along the same line is twice as long.
+        """
+        factor = min(1.0 / (2.0 - gain), _LONGEST_EXTRAPOLATION) if gain < 2.0 else _LONGEST_EXTRAPOLATION
+        if factor > self.settings.least_extrapolation:
+            trial, value = self._evaluate(flat + factor * change)
+            if value < self.merit:
+                self.state, self.merit = trial, value
+
+    def _settled(self, before: float) -> Status | None:
+        """Whether the merit has come to rest; tightens an iterative linear solver first."""
+        if self.merit == 0.0:
+            return Status.ZERO_MERIT
+        settings = self.settings
+        self.recent = [*self.recent, (before - self.merit) / before][-settings.patience :]
+        largest = max(self.recent) if len(self.recent) == settings.patience else math.inf
+        loose = self.problem.solver.inexact and self.accuracy > _TIGHTEST_ACCURACY
+        if loose and largest < max(self.accuracy, settings.merit_tolerance):
+            self.accuracy *= 0.1
+            self.recent = []
+            return None
+        return Status.MERIT_TOLERANCE if largest < settings.merit_tolerance else None
+
+    def _scale(self, system: LinearSystem) -> Tensor:
+        """Positive diagonal that the damping multiplies; one where nothing is felt."""
+        diagonal = system.diagonal
+        if self.settings.damping_scale == "identity":
+            return torch.ones_like(diagonal)
+        floor = 1e-12 * float(diagonal.max())
+        floored = diagonal.clamp_min(floor if 0.0 < floor < math.inf else 1.0)
+        return torch.where(diagonal > 0.0, floored, torch.ones_like(diagonal))
+
+    def _evaluate(self, flat: Tensor) -> tuple[dict[str, Tensor], float]:
+        trial = self.problem.layout.unflatten(flat)
+        if self.guard is not None and not self.guard(self.state, trial):
+            return trial, math.inf
+        return trial, self._merit(trial)
+
+    def _merit(self, state: State) -> float:
+        with self._timed("merit"):
+            return merit(self.problem.terms, state)
+
+    @contextmanager
+    def _timed(self, what: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        self.timings[what] += time.perf_counter() - start
+
+    def _elapsed(self) -> float:
+        return time.perf_counter() - self.begin
+
+    def _record(self, record: IterationRecord) -> bool:
+        """Keeps the record, with the observed quantities of the best state; True when the callback says stop."""
+        if record.accepted and self.observe is not None:
+            self.quantities = self.observe(self.state)
+        record.quantities.update(self.quantities)
+        self.history.append(record)
+        return bool(self.callback(record)) if self.callback is not None else False
