@@ -25,6 +25,7 @@ class TangentPlanes:
 
     def __init__(self, reference: ReferenceSurface, block: str = "vertices") -> None:
         self.reference, self.block = reference, block
+        self._tracker = reference.tracker()
         self._points: Tensor | None = None
         self._answer: tuple[Tensor, Tensor] | None = None
 
@@ -33,7 +34,7 @@ class TangentPlanes:
         points = state[self.block]
         if self._points is not None and self._answer is not None and torch.equal(self._points, points):
             return self._answer
-        closest = self.reference.closest(points)
+        closest = self._tracker.closest(points)
         away = points - closest.positions
         distance = closest.distances[:, None]
         smooth = closest.smooth_normals

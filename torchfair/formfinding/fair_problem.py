@@ -24,14 +24,16 @@ from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)
 _LEAST_SAFETY = math.radians(2.0)
+_LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
+_LARGEST_WARP = 1e-2  # relative planarity above which planarity is imposed in stages
+_PLANARITY_STAGES = 4
+_MOST_STAGES = 20
 
 
 class FairProblem:
     """Everything guided projection needs to lower E of one normalised mesh.
 
     Attributes:
-        start: Variable blocks.
-        terms: Element terms.
         fixed: Masks of unknowns that do not move.
         planar_faces: (n,) faces that are kept planar.
         notes: Decisions taken, in words.
@@ -57,16 +59,48 @@ class FairProblem:
         self.corners[self.handles] = False
         self.fixed = {"vertices": self._fixed_vertices()[:, None].expand(-1, 3).clone()}
         self.planar_faces = self._choose_planar_faces()
-        self.start, target_terms = self._energy()
-        self.terms = [
-            *target_terms,
+        self._common = [
             *self._closeness(),
             *self._boundary(),
-            *c.handle_terms(self.handles, self.targets, weight=settings.handle_weight),
-            *c.planarity_terms(topology, self.planar_faces, weight=settings.planarity_weight),
             *c.interior_fairness_terms(topology, weight=settings.fairness_weight),
             *self._quality(),
         ]
+
+    # ---- stages ----------------------------------------------------------------------------------------
+
+    def shares(self) -> list[float]:
+        """How far the constraints that the start violates are imposed, stage after stage; the last is 1.
+
+        Handles move on in small portions and planarity is raised by powers of ten, so that the barriers
+        around badly shaped faces are never asked to hold against a sudden pull.
+        """
+        pulled = torch.linalg.vector_norm(self.targets - self.vertices[self.handles], dim=1)
+        steps = math.ceil(float(pulled.max()) / _LONGEST_PULL) if pulled.numel() else 1
+        warped = planarity(self.vertices, self.topology)[self.planar_faces]
+        if warped.numel() and float(warped.max()) > _LARGEST_WARP:
+            steps = max(steps, _PLANARITY_STAGES)
+        steps = min(steps, _MOST_STAGES)
+        return [(i + 1) / steps for i in range(steps)]
+
+    def terms(self, share: float) -> list[ElementTerm]:
+        """Element terms of a stage."""
+        settings = self.settings
+        targets = self.vertices[self.handles].lerp(self.targets, share)
+        planarity_weight = (
+            settings.planarity_weight**share if settings.planarity_weight > 1.0 else settings.planarity_weight
+        )
+        return [
+            *self._energy(),
+            *self._common,
+            *c.handle_terms(self.handles, targets, weight=settings.handle_weight),
+            *c.planarity_terms(self.topology, self.planar_faces, weight=planarity_weight),
+        ]
+
+    def blocks(self, vertices: Tensor) -> dict[str, Tensor]:
+        """Variable blocks at ``vertices``; auxiliary variables satisfy their constraints there."""
+        if self.settings.formulation == "reduced":
+            return {"vertices": vertices}
+        return {"vertices": vertices, **lifted_blocks(vertices, self.topology)}
 
     # ---- decisions -------------------------------------------------------------------------------------
 
@@ -122,21 +156,19 @@ class FairProblem:
 
     # ---- terms -----------------------------------------------------------------------------------------
 
-    def _energy(self) -> tuple[dict[str, Tensor], list[ElementTerm]]:
+    def _energy(self) -> list[ElementTerm]:
         settings = self.settings
         if settings.formulation == "reduced":
-            terms = c.normal_variation_terms(self.topology, smoothing=settings.smoothing, weight=settings.energy_weight)
-            return {"vertices": self.vertices}, terms
+            return c.normal_variation_terms(self.topology, smoothing=settings.smoothing, weight=settings.energy_weight)
         planar = self.topology.face_sizes == 3
         planar[self.planar_faces] = True
-        terms = lifted_normal_variation_terms(
+        return lifted_normal_variation_terms(
             self.vertices,
             self.topology,
             planar,
             weight=settings.energy_weight,
             constraint_weight=settings.constraint_weight,
         )
-        return {"vertices": self.vertices, **lifted_blocks(self.vertices, self.topology)}, terms
 
     def _closeness(self) -> list[ElementTerm]:
         if self.design_mode:

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from ..energies import normal_variation
 from ..errors import MeshError, ShapeError
-from ..projection import ProjectionResult, guided_projection
+from ..projection import ProjectionResult, Status, guided_projection
 from ..projection.iteration import Callback
 from ..projection.layout import State
 from ..projection.normalisation import Normalisation
@@ -30,12 +30,15 @@ class FairResult:
         vertices: (V, 3) in the unit and dtype of the input.
         projection: Status, history and residual table of the iteration, in normalised units
             (energies in the history are in the unit of the input).
+        preparation: Earlier stages, where handles travel far or faces have to become planar: their
+            constraints are imposed step by step. The merit falls within each stage.
         before, after: Energies and the quantities that the job guarantees, see ``fair_measures``.
         notes: What the job decided on its own, in words.
     """
 
     vertices: Tensor
     projection: ProjectionResult
+    preparation: list[ProjectionResult]
     before: dict[str, float]
     after: dict[str, float]
     notes: list[str]
@@ -92,19 +95,28 @@ def minimise_normal_variation(
     def observe(state: State) -> dict[str, float]:
         return {"normal_variation": normalisation.length * float(normal_variation(state["vertices"], topology))}
 
-    result = guided_projection(
-        problem.start,
-        problem.terms,
-        fixed=problem.fixed,
-        settings=settings.projection,
-        callback=callback,
-        observe=observe,
-        guard=problem.keeps_faces,
-    )
-    moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(result.blocks["vertices"]))
+    state, preparation = problem.vertices, []
+    for share in problem.shares():
+        final = share == 1.0
+        result = guided_projection(
+            problem.blocks(state),
+            problem.terms(share),
+            fixed=problem.fixed,
+            settings=settings.projection if final else settings.stage(),
+            callback=callback,
+            observe=observe,
+            guard=problem.keeps_faces,
+        )
+        state = result.blocks["vertices"]
+        if not final:
+            preparation.append(result)
+        if result.status in (Status.INTERRUPTED, Status.CALLBACK):
+            break
+    moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(state))
     return FairResult(
         vertices=moved.to(vertices),
         projection=result,
+        preparation=preparation,
         before=fair_measures(start, start, topology, problem, normalisation),
         after=fair_measures(moved, start, topology, problem, normalisation),
         notes=problem.notes,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..projection import ProjectionSettings
 
@@ -56,7 +56,7 @@ class FairSettings:
     corner_angle: float = math.radians(40.0)
     planar: str | tuple[int, ...] = "keep"
     planar_tolerance: float = 1e-3
-    planarity_weight: float = 1e4
+    planarity_weight: float = 1e6
     smallest_angle: float = math.radians(10.0)
     smallest_area: float = 0.2
     quality_weight: float = 0.1
@@ -76,3 +76,7 @@ class FairSettings:
         weights = [name for name in vars(self) if name.endswith("_weight") and not getattr(self, name) >= 0.0]
         if weights:
             raise ValueError(f"weights must be at least 0: {', '.join(weights)}")
+
+    def stage(self) -> ProjectionSettings:
+        """Settings of a stage before the last: fewer steps, wider tolerance."""
+        return replace(self.projection, max_iterations=min(15, self.projection.max_iterations), merit_tolerance=1e-2)
