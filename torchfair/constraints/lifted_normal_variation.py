@@ -94,7 +94,7 @@ def lifted_normal_variation_terms(
     ]
     terms += _free_face_terms(vertices, topology, planar)
     target = ElementTerm(NAME, energy_residual, [("lengths", edges)], weight=weight)
-    return [*(replace(term, weight=constraint_weight) for term in terms), target]
+    return [*(replace(term, weight=constraint_weight) for term in terms if term.num_elements), target]
 
 
 def _free_face_terms(vertices: Tensor, topology: Topology, planar: Tensor) -> list[ElementTerm]:

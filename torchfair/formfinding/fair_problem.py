@@ -177,7 +177,7 @@ class FairProblem:
         terms = c.closeness_terms(self._planes, self.topology.num_vertices, weight=self.settings.closeness_weight)
         if self.settings.distance_limit is not None:
             distances = self.reference.closest(self.vertices).distances
-            limits = distances.clamp_min(self.settings.distance_limit)
+            limits = distances.clamp_min(self.settings.distance_limit) * (1.0 + 1e-9)  # rounding at the start
             far = int((distances > self.settings.distance_limit)[used].sum())
             if far:
                 self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")

@@ -62,7 +62,7 @@ class FairSettings:
     quality_weight: float = 0.1
     smoothing: float = 1e-2
     formulation: str = "reduced"
-    constraint_weight: float = 1e3
+    constraint_weight: float = 1e5
     projection: ProjectionSettings = field(default_factory=_default_projection)
 
     def __post_init__(self) -> None:
