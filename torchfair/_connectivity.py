@@ -1,47 +1,22 @@
-"""Builds and checks the connectivity of a polygon mesh, in numpy, once per mesh.
+"""Edges, vertex rings and boundary loops of a polygon mesh, built and checked in numpy once per mesh.
 
-A *half-edge* is a corner of a face: corner ``h`` stands for the edge from its own vertex to the vertex of
-the next corner of the same face. All arrays below are indexed by half-edge unless said otherwise.
+Arrays are indexed by half-edge (see ``_half_edges``) unless said otherwise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from ._half_edges import HalfEdges as HalfEdges
+from ._half_edges import Ints as Ints
+from ._half_edges import build_half_edges as build_half_edges
+from ._half_edges import first_few as first_few
+from ._half_edges import pack_faces as pack_faces
 from .errors import MeshError
 
-Ints = npt.NDArray[np.int64]
-
-_SHOWN = 5
 _REPAIR_HINT = "torchfair.repair_mesh re-orients faces that can be oriented consistently"
-
-
-def first_few(items: Iterable[object], total: int) -> str:
-    """The first few items as text, followed by how many were left out."""
-    shown = [str(item) for item, _ in zip(items, range(_SHOWN), strict=False)]
-    more = f" and {total - len(shown)} more" if total > len(shown) else ""
-    return ", ".join(shown) + more
-
-
-@dataclass(frozen=True)
-class HalfEdges:
-    """Packed faces and the half-edge arrays derived from them."""
-
-    num_vertices: int
-    corners: Ints  # vertex at each corner
-    offsets: Ints  # (F+1,) first corner of each face
-    faces: Ints  # face of each corner
-    next: Ints  # next corner of the same face
-    previous: Ints
-
-    @property
-    def heads(self) -> Ints:
-        """Vertex each half-edge points to."""
-        return self.corners[self.next]
 
 
 @dataclass(frozen=True)
@@ -55,105 +30,33 @@ class Edges:
     corner_edges: Ints  # (H,) edge of each half-edge
 
 
-def pack_faces(faces: object) -> tuple[Ints, Ints]:
-    """Faces in any accepted form as ``(corners, offsets)``.
+def pair_half_edges(half: HalfEdges) -> tuple[Ints, Ints, Ints]:
+    """Half-edges that share an edge, as ``(first, second, single)``, each sorted by the edge's vertex numbers.
 
-    Accepts an ``(F, k)`` array or tensor, or a sequence of index sequences of any lengths.
+    ``first`` and ``second`` are the two half-edges of the interior edges, ``single`` those of boundary edges.
+    Orientation is not looked at; edges with more than two faces are refused.
     """
-    if hasattr(faces, "detach"):
-        faces = faces.detach().cpu().numpy()
-    if isinstance(faces, np.ndarray) and faces.dtype != object:
-        if faces.size == 0:
-            return np.zeros(0, np.int64), np.zeros(1, np.int64)
-        if faces.ndim != 2 or not np.issubdtype(faces.dtype, np.integer):
-            raise MeshError(
-                f"faces: expected an integer array (F, k) or a sequence of index sequences, "
-                f"got an array of shape {faces.shape} and dtype {faces.dtype}"
-            )
-        count, size = faces.shape
-        return faces.astype(np.int64).ravel(), np.arange(count + 1, dtype=np.int64) * size
-    if not isinstance(faces, Sequence | np.ndarray):
-        raise MeshError(f"faces: expected an array or a sequence of index sequences, got {type(faces).__name__}")
-    try:
-        sizes = np.fromiter((len(face) for face in faces), np.int64, len(faces))
-        flat = [index for face in faces for index in face]
-    except TypeError as error:
-        raise MeshError(f"faces: every face must be a sequence of vertex numbers ({error})") from None
-    corners = np.asarray(flat) if flat else np.zeros(0, np.int64)
-    if corners.ndim != 1 or not np.issubdtype(corners.dtype, np.integer):
-        raise MeshError(f"faces: vertex numbers must be integers, got dtype {corners.dtype}")
-    return corners.astype(np.int64), np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-
-
-def build_half_edges(corners: Ints, offsets: Ints, num_vertices: int | None) -> HalfEdges:
-    """Checks face sizes and indices, then links each corner to its neighbours in the face."""
-    sizes = np.diff(offsets)
-    small = np.flatnonzero(sizes < 3)
-    if small.size:
-        raise MeshError(
-            f"{small.size} face(s) have fewer than three corners: faces {first_few(small, small.size)}. "
-            "Remove them from the face list."
-        )
-    if num_vertices is None:
-        num_vertices = int(corners.max()) + 1 if corners.size else 0
-    face_ids = np.repeat(np.arange(sizes.size, dtype=np.int64), sizes)
-    outside = np.flatnonzero((corners < 0) | (corners >= num_vertices))
-    if outside.size:
-        named = (f"face {face_ids[h]} uses vertex {corners[h]}" for h in outside)
-        raise MeshError(
-            f"vertex numbers out of range 0..{num_vertices - 1}: {first_few(named, outside.size)}. "
-            "Count vertices from zero and pass num_vertices if the last vertices are unused."
-        )
-    following = np.arange(1, corners.size + 1, dtype=np.int64)
-    following[offsets[1:] - 1] = offsets[:-1]
-    previous = np.empty_like(following)
-    previous[following] = np.arange(corners.size, dtype=np.int64)
-    _check_repeats(corners, face_ids, num_vertices)
-    return HalfEdges(num_vertices, corners, offsets, face_ids, following, previous)
-
-
-def _check_repeats(corners: Ints, face_ids: Ints, num_vertices: int) -> None:
-    keys = np.sort(face_ids * max(num_vertices, 1) + corners)
-    repeated = np.unique(keys[1:][keys[1:] == keys[:-1]] // max(num_vertices, 1))
-    if repeated.size:
-        raise MeshError(
-            f"{repeated.size} face(s) use a vertex more than once: faces {first_few(repeated, repeated.size)}. "
-            "Remove the repeated corner, or the face if fewer than three corners remain."
-        )
+    tails, heads = half.corners, half.heads
+    keys = np.minimum(tails, heads) * max(half.num_vertices, 1) + np.maximum(tails, heads)
+    order = np.argsort(keys, kind="stable")
+    starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    counts = np.diff(np.r_[starts, keys.size])
+    _check_manifold_edges(half, order, starts, counts)
+    interior = starts[counts == 2]
+    return order[interior], order[interior + 1], order[starts[counts == 1]]
 
 
 def build_edges(half: HalfEdges) -> Edges:
     """Pairs half-edges into edges; refuses non-manifold edges and inconsistent orientation."""
+    first, second, boundary = pair_half_edges(half)
     tails, heads = half.corners, half.heads
-    forward = tails < heads
-    keys = np.where(forward, tails, heads) * max(half.num_vertices, 1) + np.where(forward, heads, tails)
-    order = np.argsort(keys, kind="stable")
-    sorted_keys = keys[order]
-    starts = np.flatnonzero(np.r_[True, sorted_keys[1:] != sorted_keys[:-1]]) if keys.size else np.zeros(0, np.int64)
-    counts = np.diff(np.r_[starts, keys.size])
-    _check_manifold_edges(half, order, starts, counts)
-
-    interior = counts == 2
-    first = order[starts[interior]]
-    second = order[starts[interior] + 1]
-    clash = np.flatnonzero(forward[first] == forward[second])
-    if clash.size:
-        named = (
-            f"faces {half.faces[first[c]]} and {half.faces[second[c]]} along edge "
-            f"({tails[first[c]]}, {heads[first[c]]})"
-            for c in clash
-        )
-        raise MeshError(
-            f"inconsistent orientation: {clash.size} edge(s) are traversed twice in the same direction: "
-            f"{first_few(named, clash.size)}. {_REPAIR_HINT}."
-        )
-    left = np.where(forward[first], first, second)
-    right = np.where(forward[first], second, first)
-    boundary = order[starts[~interior]]
+    _check_orientation(half, first, second)
+    forward = tails[first] < heads[first]
+    left, right = np.where(forward, first, second), np.where(forward, second, first)
     half_edges = np.concatenate([left, boundary])
-    twins = np.full(keys.size, -1, np.int64)
+    twins = np.full(tails.size, -1, np.int64)
     twins[left], twins[right] = right, left
-    corner_edges = np.empty(keys.size, np.int64)
+    corner_edges = np.empty(tails.size, np.int64)
     corner_edges[half_edges] = np.arange(half_edges.size)
     corner_edges[right] = np.arange(right.size)
     return Edges(
@@ -163,6 +66,19 @@ def build_edges(half: HalfEdges) -> Edges:
         twins=twins,
         corner_edges=corner_edges,
     )
+
+
+def _check_orientation(half: HalfEdges, first: Ints, second: Ints) -> None:
+    clash = np.flatnonzero(half.corners[first] == half.corners[second])
+    if clash.size:
+        named = (
+            f"faces {half.faces[a]} and {half.faces[b]} along edge ({half.corners[a]}, {half.corners[half.next[a]]})"
+            for a, b in zip(first[clash], second[clash], strict=True)
+        )
+        raise MeshError(
+            f"inconsistent orientation: {clash.size} edge(s) are traversed twice in the same direction: "
+            f"{first_few(named, clash.size)}. {_REPAIR_HINT}."
+        )
 
 
 def _check_manifold_edges(half: HalfEdges, order: Ints, starts: Ints, counts: Ints) -> None:
@@ -184,52 +100,48 @@ def _check_manifold_edges(half: HalfEdges, order: Ints, starts: Ints, counts: In
 def build_rings(half: HalfEdges, edges: Edges) -> tuple[Ints, Ints]:
     """Neighbours of every vertex in counterclockwise order, packed as ``(ring_vertices, ring_offsets)``.
 
-    Around boundary vertices the ring starts with the boundary edge that has the surface on its left.
-    Refuses vertices whose faces form more than one fan.
+    Around boundary vertices the ring starts with the boundary edge that has the surface on its left; around
+    others with the edge of the first face that uses the vertex. Refuses vertices whose faces form more than
+    one fan.
     """
     tails = half.corners
-    degree = np.bincount(tails, minlength=half.num_vertices).astype(np.int64)
-    around = edges.twins[half.previous]  # next outgoing half-edge, counterclockwise; -1 at the end of an open fan
     is_open = edges.twins < 0
     start = np.full(half.num_vertices, -1, np.int64)
     start[tails[::-1]] = np.arange(tails.size - 1, -1, -1)
     start[tails[is_open]] = np.flatnonzero(is_open)
-    _check_open_fans(half, is_open)
-    has_boundary = np.zeros(half.num_vertices, bool)
-    has_boundary[tails[is_open]] = True
+    around = edges.twins[half.previous]  # next outgoing half-edge, counterclockwise; -1 at the end of an open fan
+    ends = around < 0
+    degree = np.bincount(tails, minlength=half.num_vertices).astype(np.int64)
+    remaining = _steps_to_end(np.where(around == start[tails], -1, around), int(degree.max(initial=0)))
+    used = np.flatnonzero(start >= 0)
+    split = used[remaining[start[used]] + 1 != degree[used]]
+    if split.size:  # the chain from the start misses some faces
+        raise MeshError(
+            f"non-manifold: the faces around {split.size} vertex(es) form more than one fan: "
+            f"vertices {first_few(split, split.size)}. Duplicate such a vertex, one copy per fan."
+        )
 
+    has_boundary = np.bincount(tails[is_open], minlength=half.num_vertices)
     offsets = np.concatenate([[0], np.cumsum(degree + has_boundary)])
     ring = np.empty(offsets[-1], np.int64)
-    active = np.flatnonzero(start >= 0)
-    current, step = start[active], 0
-    visited = np.zeros(half.num_vertices, np.int64)
-    while active.size:
-        ring[offsets[active] + step] = half.heads[current]
-        visited[active] += 1
-        last = around[current] < 0
-        ended = active[last]
-        ring[offsets[ended] + step + 1] = tails[half.previous[current[last]]]
-        going = ~last & (around[current] != start[active])
-        active, current = active[going], around[current[going]]
-        step += 1
-    split = np.flatnonzero(visited != degree)
-    if split.size:
-        _raise_split_vertices(split)
+    ring[offsets[tails] + degree[tails] - 1 - remaining] = half.heads
+    ring[offsets[tails[ends] + 1] - 1] = tails[half.previous[ends]]
     return ring, offsets
 
 
-def _check_open_fans(half: HalfEdges, is_open: npt.NDArray[np.bool_]) -> None:
-    fans = np.bincount(half.corners[is_open], minlength=half.num_vertices)
-    split = np.flatnonzero(fans > 1)
-    if split.size:
-        _raise_split_vertices(split)
+def _steps_to_end(following: Ints, longest: int) -> Ints:
+    """Steps from every link to the end of its chain of at most ``longest`` links; ``following`` is -1 at ends.
 
-
-def _raise_split_vertices(split: Ints) -> None:
-    raise MeshError(
-        f"non-manifold: the faces around {split.size} vertex(es) form more than one fan: "
-        f"vertices {first_few(split, split.size)}. Duplicate such a vertex, one copy per fan."
-    )
+    Pointer doubling: each round doubles the distance looked ahead, so that one vertex of huge valence costs
+    no more than a million ordinary ones. Links on closed chains get a meaningless number.
+    """
+    sentinel = following.size
+    ahead = np.append(np.where(following < 0, sentinel, following), sentinel)
+    steps: Ints = (ahead != sentinel).astype(np.int64)
+    for _ in range(longest.bit_length()):
+        steps += steps[ahead]
+        ahead = ahead[ahead]
+    return steps[:-1]
 
 
 def build_boundary_loops(half: HalfEdges, edges: Edges) -> tuple[Ints, Ints]:

@@ -14,6 +14,9 @@ from torch import Tensor
 from . import _connectivity
 from .errors import MeshError, ShapeError
 
+_EAGER_TABLES = ("face_sizes", "is_triangular", "is_quadrangular", "faces_by_size", "next_corners", "valences",
+                 "is_boundary_vertex")  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Topology:
@@ -57,6 +60,12 @@ class Topology:
     loop_vertices: Tensor
     loop_offsets: Tensor
 
+    def __post_init__(self) -> None:
+        # Tables that quantities read are filled now: one that is first read inside nested function transforms
+        # would keep a tensor that belongs to the transform.
+        for name in _EAGER_TABLES:
+            getattr(self, name)
+
     @classmethod
     def from_faces(cls, faces: object, num_vertices: int | None = None) -> Topology:
         """Topology of ``faces``.
@@ -71,8 +80,14 @@ class Topology:
                 or is traversed twice in one direction, or the faces around a vertex form several fans.
                 :func:`torchfair.repair_mesh` mends what can be mended.
         """
-        corners, offsets = _connectivity.pack_faces(faces)
-        half = _connectivity.build_half_edges(corners, offsets, num_vertices)
+        return cls.from_packed_faces(*_connectivity.pack_faces(faces), num_vertices)
+
+    @classmethod
+    def from_packed_faces(
+        cls, corners: _connectivity.Ints, face_offsets: _connectivity.Ints, num_vertices: int | None = None
+    ) -> Topology:
+        """Like :meth:`from_faces`, from numpy arrays (copied) as in attributes ``corners`` and ``face_offsets``."""
+        half = _connectivity.build_half_edges(corners.copy(), face_offsets.copy(), num_vertices)
         edges = _connectivity.build_edges(half)
         ring, ring_offsets = _connectivity.build_rings(half, edges)
         loops, loop_offsets = _connectivity.build_boundary_loops(half, edges)
@@ -246,8 +261,11 @@ class Topology:
 
     def check_vertices(self, vertices: Tensor) -> None:
         """Raises ShapeError unless ``vertices`` is a floating tensor ``(*batch, V, 3)``. Values are not read."""
-        expected = f"a floating tensor (*batch, {self.num_vertices}, 3)"
         if not isinstance(vertices, Tensor):
-            raise ShapeError("vertices", expected, type(vertices).__name__)
+            raise self._vertices_error(type(vertices).__name__)
         if vertices.shape[-2:] != (self.num_vertices, 3) or not vertices.is_floating_point():
-            raise ShapeError("vertices", expected, f"{tuple(vertices.shape)} {vertices.dtype}")
+            raise self._vertices_error(f"{tuple(vertices.shape)} {vertices.dtype}")
+
+    def _vertices_error(self, actual: str) -> ShapeError:
+        # Written only when it is raised: torch.compile cannot format sizes that it holds as symbols.
+        return ShapeError("vertices", f"a floating tensor (*batch, {self.num_vertices}, 3)", actual)

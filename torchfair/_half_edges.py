@@ -1,0 +1,119 @@
+"""Packs and checks faces and links their corners.
+
+A *half-edge* is a corner of a face: corner ``h`` stands for the edge from its own vertex to the vertex of
+the next corner of the same face. Arrays are indexed by half-edge unless said otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import MeshError
+
+Ints = npt.NDArray[np.int64]
+
+_SHOWN = 5
+_MOST_VERTICES = 2**31  # keeps the products below in 64 bits and a stray huge index from eating the memory
+
+
+def first_few(items: Iterable[object], total: int) -> str:
+    """The first few items as text, followed by how many were left out."""
+    shown = [str(item) for item, _ in zip(items, range(_SHOWN), strict=False)]
+    more = f" and {total - len(shown)} more" if total > len(shown) else ""
+    return ", ".join(shown) + more
+
+
+@dataclass(frozen=True)
+class HalfEdges:
+    """Packed faces and the half-edge arrays derived from them."""
+
+    num_vertices: int
+    corners: Ints  # vertex at each corner
+    offsets: Ints  # (F+1,) first corner of each face
+    faces: Ints  # face of each corner
+    next: Ints  # next corner of the same face
+    previous: Ints
+
+    @property
+    def heads(self) -> Ints:
+        """Vertex each half-edge points to."""
+        return self.corners[self.next]
+
+
+def pack_faces(faces: object) -> tuple[Ints, Ints]:
+    """Faces in any accepted form as ``(corners, offsets)``.
+
+    Accepts an ``(F, k)`` array or tensor, or a sequence of index sequences of any lengths.
+    """
+    if hasattr(faces, "detach"):
+        faces = faces.detach().cpu().numpy()
+    if isinstance(faces, np.ndarray) and faces.dtype != object:
+        if faces.shape[:1] == (0,):
+            return np.zeros(0, np.int64), np.zeros(1, np.int64)
+        if faces.ndim != 2 or not np.issubdtype(faces.dtype, np.integer):
+            raise MeshError(
+                f"faces: expected an integer array (F, k) or a sequence of index sequences, "
+                f"got an array of shape {faces.shape} and dtype {faces.dtype}"
+            )
+        count, size = faces.shape
+        return faces.astype(np.int64).ravel(), np.arange(count + 1, dtype=np.int64) * size
+    if not isinstance(faces, Sequence | np.ndarray):
+        raise MeshError(f"faces: expected an array or a sequence of index sequences, got {type(faces).__name__}")
+    try:
+        sizes = np.fromiter((len(face) for face in faces), np.int64, len(faces))
+        flat = [index for face in faces for index in face]
+        corners = np.asarray(flat) if flat else np.zeros(0, np.int64)
+    except (TypeError, ValueError) as error:
+        raise MeshError(f"faces: every face must be a sequence of vertex numbers ({error})") from None
+    if corners.ndim != 1 or not np.issubdtype(corners.dtype, np.integer):
+        raise MeshError(f"faces: vertex numbers must be integers, got dtype {corners.dtype}")
+    return corners.astype(np.int64), np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+
+def build_half_edges(corners: Ints, offsets: Ints, num_vertices: int | None) -> HalfEdges:
+    """Checks face sizes and indices, then links each corner to its neighbours in the face."""
+    sizes = np.diff(offsets)
+    small = np.flatnonzero(sizes < 3)
+    if small.size:
+        raise MeshError(
+            f"{small.size} face(s) have fewer than three corners: faces {first_few(small, small.size)}. "
+            "Remove them from the face list."
+        )
+    face_ids = np.repeat(np.arange(sizes.size, dtype=np.int64), sizes)
+    num_vertices = _count_vertices(corners, face_ids, num_vertices)
+    following = np.arange(1, corners.size + 1, dtype=np.int64)
+    following[offsets[1:] - 1] = offsets[:-1]
+    previous = np.empty_like(following)
+    previous[following] = np.arange(corners.size, dtype=np.int64)
+    _check_repeats(corners, face_ids, num_vertices)
+    return HalfEdges(num_vertices, corners, offsets, face_ids, following, previous)
+
+
+def _count_vertices(corners: Ints, face_ids: Ints, num_vertices: int | None) -> int:
+    """V as given, else one more than the largest index; refuses indices outside 0..V-1."""
+    if num_vertices is None:
+        num_vertices = min(int(corners.max(initial=-1)) + 1, _MOST_VERTICES)
+    elif not 0 <= num_vertices <= _MOST_VERTICES:
+        raise MeshError(f"num_vertices must lie between 0 and {_MOST_VERTICES}, got {num_vertices}")
+    outside = np.flatnonzero((corners < 0) | (corners >= num_vertices))
+    if outside.size:
+        named = (f"face {face_ids[h]} uses vertex {corners[h]}" for h in outside)
+        raise MeshError(
+            f"vertex numbers out of range 0 <= number < {num_vertices}: {first_few(named, outside.size)}. "
+            "Count vertices from zero and pass num_vertices if the last vertices are unused."
+        )
+    return num_vertices
+
+
+def _check_repeats(corners: Ints, face_ids: Ints, num_vertices: int) -> None:
+    keys = np.sort(face_ids * max(num_vertices, 1) + corners)
+    repeated = np.unique(keys[1:][keys[1:] == keys[:-1]] // max(num_vertices, 1))
+    if repeated.size:
+        raise MeshError(
+            f"{repeated.size} face(s) use a vertex more than once: faces {first_few(repeated, repeated.size)}. "
+            "Remove the repeated corner, or the face if fewer than three corners remain."
+        )

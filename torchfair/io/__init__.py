@@ -1,0 +1,12 @@
+"""Polygon meshes in and out of files.
+
+:func:`load_mesh` and :func:`save_mesh` choose the format by the extension: OBJ, OFF and PLY are read and
+written here and keep polygons, order and orientation; other formats go through trimesh, which is imported
+only then.
+"""
+
+from .atomic import atomic_write_bytes as atomic_write_bytes
+from .atomic import atomic_write_text as atomic_write_text
+from .polygon_mesh import PolygonMesh as PolygonMesh
+from .reading import load_mesh as load_mesh
+from .writing import save_mesh as save_mesh

@@ -1,0 +1,111 @@
+"""Wavefront OBJ: vertices and polygons.
+
+Read are ``v x y z`` (colours or a weight behind are ignored) and ``f`` with corners ``v``, ``v/vt``,
+``v//vn`` or ``v/vt/vn``, counted from 1, or from the last vertex backwards if negative. Every other statement
+of the format is skipped; a word that is none of them is an error, because a damaged ``v`` would shift all
+vertex numbers after it. A backslash at the end of a line continues it, except in comments and names, where
+it ends a Windows path.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import MeshFileError
+from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
+from .text import Words, check_text, quote, ranges, split_words, to_floats, to_ints
+from .text_rows import face_lines, vertex_lines
+
+_SKIPPED = frozenset(
+    b"vt vn vp l p g o s mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj ctech "
+    b"stech cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con vc".split()
+)
+_VERTEX_SIZES = (3, 4, 6, 7)  # xyz, weight, rgb, both
+_CORNER = re.compile(rb"[-+0-9]*(/[-+0-9]*){0,2}")
+_NAMING = (b"o", b"g", b"usemtl", b"mtllib", b"usemap", b"maplib", b"shadow_obj", b"trace_obj")
+
+
+def read_obj(path: Path, data: bytes) -> RawMesh:
+    """Polygon mesh of an OBJ file.
+
+    Raises:
+        MeshFileError: with the line of the fault.
+    """
+    text = split_words(_plain_statements(check_text(path, data)))
+    vertex_rows, face_rows = _vertex_and_face_rows(path, text)
+    points = _read_vertices(path, text, vertex_rows)
+    sizes = text.sizes[face_rows] - 1
+    positions = ranges(text.starts[face_rows] + 1, sizes)
+    if positions.size and b"/" in data:
+        _drop_slashes(path, text, positions)
+    numbers = to_ints(path, text, positions)
+    # a negative number counts back from the last vertex that stands before the face
+    known = np.repeat(np.searchsorted(vertex_rows, face_rows), sizes)
+    corners = np.where((numbers < 0) & (known + numbers >= 0), known + numbers, numbers - 1)
+    origin = Origin(path, text.lines[vertex_rows], text.lines[face_rows], first_index=1)
+    return assemble(origin, points, corners, sizes)
+
+
+def write_obj(mesh: RawMesh) -> bytes:
+    """The bytes of an OBJ file."""
+    return (vertex_lines(mesh.points, "v ") + face_lines(mesh, prefix="f ", first_index=1)).encode()
+
+
+def _plain_statements(data: bytes) -> bytes:
+    """``data`` without comments and with continued lines joined; no line changes its number."""
+    if b"#" in data:
+        data = re.sub(rb"#[^\r\n]*", b"", data)
+    if not re.search(rb"\\[ \t]*[\r\n]", data):
+        return data
+    joined: list[bytes] = []
+    lines = iter(data.splitlines())
+    for line in lines:
+        statement, blank_lines = line.rstrip(), 0
+        while statement.endswith(b"\\") and statement.split(None, 1)[0] not in _NAMING:
+            statement = statement[:-1] + b" " + next(lines, b"").rstrip()
+            blank_lines += 1
+        joined += [statement] + [b""] * blank_lines
+    return b"\n".join(joined)
+
+
+def _vertex_and_face_rows(path: Path, text: Words) -> tuple[Ints, Ints]:
+    """Lines that begin with ``v`` and lines that begin with ``f``."""
+    keywords = [text.words[start] for start in text.starts[:-1].tolist()]
+    unknown = set(keywords) - _SKIPPED - {b"v", b"f"}
+    if unknown:
+        row = next(row for row, word in enumerate(keywords) if word in unknown)
+        raise MeshFileError(path, f"{quote(keywords[row])} does not start an OBJ statement", int(text.lines[row]))
+    kind_of = dict.fromkeys(keywords, 0) | {b"v": 1, b"f": 2}
+    kinds = np.fromiter(map(kind_of.__getitem__, keywords), np.int8, len(keywords))
+    return np.flatnonzero(kinds == 1), np.flatnonzero(kinds == 2)
+
+
+def _read_vertices(path: Path, text: Words, rows: Ints) -> Floats:
+    sizes = text.sizes[rows] - 1
+    wrong = np.flatnonzero(~np.isin(sizes, _VERTEX_SIZES))
+    if wrong.size:
+        fault = f"a vertex needs three coordinates, got {sizes[wrong[0]]} number(s)"
+        raise MeshFileError(path, fault, int(text.lines[rows[wrong[0]]]))
+    first = text.starts[rows] + 1
+    to_floats(path, text, ranges(first + 3, sizes - 3))  # weights and colours are not used, but must be numbers
+    return to_floats(path, text, ranges(first, np.full_like(first, 3))).reshape(-1, 3)
+
+
+def _drop_slashes(path: Path, text: Words, positions: Ints) -> None:
+    """Cuts corners such as 1/2/3 down to 1, in place."""
+    places = positions.tolist()
+    words = [text.words[place] for place in places]
+    joined = b" ".join(words)
+    codes = np.frombuffer(joined, np.uint8)
+    slash = codes[(codes == ord("/")) | (codes == ord(" "))] == ord("/")
+    too_many = slash[:-2] & slash[1:-1] & slash[2:]
+    if joined.translate(None, b"0123456789+-/ ") or too_many.any():
+        for place, word in zip(places, words, strict=True):
+            if not _CORNER.fullmatch(word):
+                fault = f"a face corner must look like 1, 1/2, 1//3 or 1/2/3, got {quote(word)}"
+                raise MeshFileError(path, fault, text.line_of(place))
+    for place, word in zip(places, words, strict=True):
+        text.words[place] = word.partition(b"/")[0]

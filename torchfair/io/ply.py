@@ -1,0 +1,123 @@
+"""Stanford PLY, as text and in both binary byte orders: vertices and polygons.
+
+Read are ``x, y, z`` of the element ``vertex`` and the list ``vertex_indices`` (or ``vertex_index``) of the
+element ``face``; every other property and element is skipped. Written are float64 positions.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import MeshFileError
+from .ply_header import Element, Header, read_header
+from .ply_rows import Column, read_binary_rows, read_text_rows
+from .raw_mesh import Ints, Origin, RawMesh, assemble
+from .text import check_text, split_words
+from .text_rows import face_lines, vertex_lines
+
+
+def read_ply(path: Path, data: bytes) -> RawMesh:
+    """Polygon mesh of a PLY file.
+
+    Raises:
+        MeshFileError: with the line of the fault, where the file is text.
+    """
+    header = read_header(path, data)
+    wanted = _wanted_properties(path, header)
+    if header.byte_order:
+        columns = _read_binary(path, data, header, wanted)
+        origin = Origin(path)
+    else:
+        columns, lines = _read_text(path, data, header, wanted)
+        origin = Origin(path, lines["vertex"], lines["face"])
+    points = np.stack([values for values, _ in columns["vertex"]], axis=1).astype(np.float64)
+    corners, sizes = columns["face"][0]
+    return assemble(origin, points, corners.astype(np.int64), sizes)
+
+
+def _wanted_properties(path: Path, header: Header) -> dict[str, list[int]]:
+    """Positions of the properties to read, for the elements ``vertex`` and ``face``."""
+    elements = {element.name: element for element in header.elements}
+    for name in ("vertex", "face"):
+        if name not in elements:
+            found = ", ".join(elements) or "none"
+            raise MeshFileError(path, f"the header has no element '{name}' (elements: {found})", header.num_lines)
+    coordinates = [_find(path, header, elements["vertex"], False, axis) for axis in "xyz"]
+    corners = _find(path, header, elements["face"], True, "vertex_indices", "vertex_index")
+    return {"vertex": coordinates, "face": [corners]}
+
+
+def _find(path: Path, header: Header, element: Element, is_list: bool, *names: str) -> int:
+    position = element.find(*names)
+    if position is not None:
+        found = element.properties[position]
+        if (found.count_type is not None) == is_list and not (is_list and "f" in found.type):
+            return position
+    kind = "list of whole numbers" if is_list else "number"
+    raise MeshFileError(path, f"element '{element.name}' has no {kind} '{names[0]}'", header.num_lines)
+
+
+def _read_binary(path: Path, data: bytes, header: Header, wanted: dict[str, list[int]]) -> dict[str, list[Column]]:
+    columns = {}
+    position = header.body_start
+    for element in header.elements:
+        columns[element.name], position = read_binary_rows(path, data, position, element, wanted.get(element.name, []))
+    if data[position:].strip():
+        raise MeshFileError(path, f"{len(data) - position} bytes follow the last element that the header promises")
+    return columns
+
+
+def _read_text(
+    path: Path, data: bytes, header: Header, wanted: dict[str, list[int]]
+) -> tuple[dict[str, list[Column]], dict[str, Ints]]:
+    """Columns, and line numbers of the rows, of every element."""
+    check_text(path, data)
+    text = split_words(data[header.body_start :], header.num_lines + 1)
+    columns, element_lines = {}, {}
+    taken, available = 0, len(text.lines)
+    for element in header.elements:
+        end = taken + (element.count if element.properties else 0)
+        if end > available:
+            fault = f"the file ends within the {element.count} rows of element '{element.name}'"
+            raise MeshFileError(path, fault, int(text.lines[-1]) if available else header.num_lines)
+        rows = text.between(taken, end)
+        element_lines[element.name] = rows.lines
+        columns[element.name] = read_text_rows(path, rows, element, wanted.get(element.name, []))
+        taken = end
+    if taken < available:
+        raise MeshFileError(path, "more rows follow than the header promises", int(text.lines[taken]))
+    return columns, element_lines
+
+
+def write_ply(mesh: RawMesh, *, binary: bool = False) -> bytes:
+    """The bytes of a PLY file, as text or in little-endian binary."""
+    sizes = np.diff(mesh.offsets)
+    count_type = "uchar" if sizes.max() < 256 else "int"
+    header = [
+        "ply",
+        f"format {'binary_little_endian' if binary else 'ascii'} 1.0",
+        f"element vertex {len(mesh.points)}",
+        *(f"property double {axis}" for axis in "xyz"),
+        f"element face {len(sizes)}",
+        f"property list {count_type} int vertex_indices",
+        "end_header\n",
+    ]
+    text = "\n".join(header)
+    if binary:
+        count_width = 1 if count_type == "uchar" else 4
+        return text.encode() + mesh.points.astype("<f8").tobytes() + _binary_faces(mesh, sizes, count_width)
+    return (text + vertex_lines(mesh.points) + face_lines(mesh, with_size=True)).encode()
+
+
+def _binary_faces(mesh: RawMesh, sizes: Ints, count_width: int) -> bytes:
+    """Faces as counts of ``count_width`` bytes, each followed by its vertex numbers of four bytes."""
+    faces = np.arange(len(sizes), dtype=np.int64)
+    count_starts = mesh.offsets[:-1] * 4 + faces * count_width
+    corner_starts = np.arange(len(mesh.corners)) * 4 + (np.repeat(faces, sizes) + 1) * count_width
+    buffer = np.empty(len(mesh.corners) * 4 + len(sizes) * count_width, np.uint8)
+    count_bytes = sizes.astype("<i4").view(np.uint8).reshape(-1, 4)[:, :count_width]
+    buffer[count_starts[:, None] + np.arange(count_width)] = count_bytes
+    buffer[corner_starts[:, None] + np.arange(4)] = mesh.corners.astype("<i4").view(np.uint8).reshape(-1, 4)
+    return buffer.tobytes()

@@ -1,0 +1,67 @@
+"""What every file format is read into and written from, and the checks common to all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import MeshFileError
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+
+
+class RawMesh(NamedTuple):
+    """Points and packed faces in file order; face ``i`` is ``corners[offsets[i]:offsets[i + 1]]``."""
+
+    points: Floats  # (V, 3)
+    corners: Ints  # vertex numbers from zero
+    offsets: Ints  # (F+1,)
+
+
+class Origin(NamedTuple):
+    """Where vertices and faces stand in a file, for error messages."""
+
+    path: Path
+    vertex_lines: Ints | None = None  # line of each vertex; None in binary files
+    face_lines: Ints | None = None
+    first_index: int = 0  # how the format counts vertices
+
+
+def assemble(origin: Origin, points: Floats, corners: Ints, sizes: Ints) -> RawMesh:
+    """A checked mesh.
+
+    Raises:
+        MeshFileError: if there are no vertices or faces, a coordinate is not finite, a face has fewer than
+            three corners, or a vertex number does not exist.
+    """
+    for count, name in ((len(points), "vertices"), (len(sizes), "faces")):
+        if not count:
+            raise MeshFileError(origin.path, f"the mesh has no {name}")
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        values = ", ".join(map(repr, points[bad[0]].tolist()))
+        fault = f"vertex {bad[0] + origin.first_index} has coordinates that are not finite numbers: {values}"
+        raise MeshFileError(origin.path, fault, _line(origin.vertex_lines, bad[0]))
+    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    small = np.flatnonzero(sizes < 3)
+    if small.size:
+        fault = f"face {small[0] + origin.first_index} has {sizes[small[0]]} corner(s); a face needs three or more"
+        raise MeshFileError(origin.path, fault, _line(origin.face_lines, small[0]))
+    outside = np.flatnonzero((corners < 0) | (corners >= len(points)))
+    if outside.size:
+        face = int(np.searchsorted(offsets, outside[0], side="right")) - 1
+        first = origin.first_index
+        fault = (
+            f"face {face + first} uses vertex {corners[outside[0]] + first}, "
+            f"but the vertices are numbered {first}..{len(points) - 1 + first}"
+        )
+        raise MeshFileError(origin.path, fault, _line(origin.face_lines, face))
+    return RawMesh(points, corners, offsets)
+
+
+def _line(lines: Ints | None, row: int) -> int | None:
+    return None if lines is None else int(lines[row])

@@ -1,0 +1,82 @@
+"""Polygon meshes to files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from .._half_edges import first_few
+from ..errors import MeshError, MeshFileError, ShapeError
+from ..topology import Topology
+from . import others
+from .atomic import atomic_write_bytes
+from .obj import write_obj
+from .off import write_off
+from .ply import write_ply
+from .raw_mesh import RawMesh
+
+
+def save_mesh(
+    path: str | os.PathLike[str],
+    vertices: Tensor,
+    topology: Topology,
+    *,
+    overwrite: bool = False,
+    binary: bool = False,
+) -> None:
+    """Writes a polygon mesh; the file appears whole or not at all.
+
+    The format follows from the extension. OBJ, OFF and PLY keep polygons, vertex order and orientation; their
+    text holds the shortest digits that read back to the same float64. STL and GLB go through trimesh: triangles
+    only, in single precision.
+
+    Args:
+        path: the file; its folder must exist.
+        vertices: (V, 3), any floating type and device.
+        topology: connectivity, at least one face.
+        overwrite: whether an existing file may be replaced. Without it, no file is replaced even if it comes
+            into being during the call.
+        binary: whether to write PLY in (little-endian) binary.
+
+    Raises:
+        ShapeError: if ``vertices`` is not ``(V, 3)``; a batch has to be written mesh by mesh.
+        MeshError: if a coordinate is not finite, there is no face, or the format does not hold such faces.
+        MeshFileError: if the extension is unknown or the file cannot be written.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    known = (".obj", ".off", ".ply", *others.WRITTEN)
+    if suffix not in known:
+        raise MeshFileError(path, f"cannot write the format {suffix or '(none)'}. Known are {', '.join(known)}")
+    if binary and suffix != ".ply":
+        raise MeshFileError(path, "only PLY files have a binary form here. Leave out binary=True")
+    mesh = _raw_mesh(vertices, topology)
+    if suffix == ".obj":
+        data = write_obj(mesh)
+    elif suffix == ".off":
+        data = write_off(mesh)
+    elif suffix == ".ply":
+        data = write_ply(mesh, binary=binary)
+    else:
+        data = others.write_other(mesh, suffix)
+    atomic_write_bytes(path, data, overwrite=overwrite)
+
+
+def _raw_mesh(vertices: Tensor, topology: Topology) -> RawMesh:
+    topology.check_vertices(vertices)
+    if vertices.ndim != 2:
+        raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3)", tuple(vertices.shape))
+    if not topology.num_faces:
+        raise MeshError("the mesh has no faces, and no file format here can be read back without any")
+    points = vertices.detach().to("cpu", torch.float64).numpy()
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"{bad.size} vertex(es) have coordinates that are not finite: vertices {first_few(bad, bad.size)}. "
+            "Nothing was written."
+        )
+    return RawMesh(points, topology.corners.cpu().numpy(), topology.face_offsets.cpu().numpy())
