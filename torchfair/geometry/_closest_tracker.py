@@ -1,0 +1,91 @@
+"""The nearest pieces of points that move a little between one search and the next, exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._closest_boxes import Floats, Ints
+from ._closest_search import BLOCK, PAIRS, PARTS, Shape, lowest_piece, margin, measure
+
+_CANDIDATES = 16  # pieces kept per point
+_SKIN = 0.2  # how far beyond the nearest piece candidates are gathered, in extents of a piece
+
+
+class PieceTracker:
+    """Keeps for every point the pieces around the place (its anchor) where it was searched last.
+
+    Every piece that is not among the candidates of a point was at least ``radius`` away from its anchor.
+    After the point has moved by m it is at least ``radius - m`` away, so the nearest candidate is the
+    nearest piece of all if it is nearer than that; if not, the point is searched again and gets a new
+    anchor. Of the candidates only those are measured whose distance from the anchor was at most the
+    distance to the last piece + m.
+    """
+
+    def __init__(self, shape: Shape) -> None:
+        self._shape = shape
+        self._skin = _SKIN * np.minimum(shape.extents, shape.extents.mean())
+        self._anchors: Floats = np.zeros((0, 0))
+
+    def nearest(self, points: Floats) -> Ints:
+        """The same as :func:`nearest_pieces` for the points (d, N), faster if they are near the last ones."""
+        if points.shape != self._anchors.shape:
+            self._reset(points)
+            return self._last.copy()
+        step = points - self._anchors
+        moved = np.sqrt((step * step).sum(0))
+        bound = np.sqrt(self._shape.squared_distances(points, self._last)) + moved
+        bound += margin(self._shape, bound)
+        known = bound < self._radius
+        row, column = np.nonzero(self._distances <= np.where(known, bound, -1.0)[:, None])
+        if row.size:
+            piece = self._candidates[row, column]
+            self._last[known] = lowest_piece(row, piece, measure(self._shape, points, row, piece))
+        lost = np.flatnonzero(~known)
+        if lost.size:
+            self._search(lost, points)
+        return self._last.copy()
+
+    def _reset(self, points: Floats) -> None:
+        count = points.shape[1]
+        self._anchors = points.copy()
+        self._radius = np.zeros(count)
+        self._candidates = np.zeros((count, _CANDIDATES), np.int64)
+        self._distances = np.full((count, _CANDIDATES), np.inf)
+        self._last = self._shape.guess(points)
+        self._search(np.arange(count), points)
+
+    def _search(self, rows: Ints, points: Floats) -> None:
+        for first in range(0, rows.size, BLOCK):
+            block = rows[first : first + BLOCK]
+            self._anchor(block, points[:, block], self._last[block])
+
+    def _anchor(self, rows: Ints, points: Floats, guess: Ints) -> None:
+        """Searches the points (d, n) with these row numbers, given a piece near each."""
+        reach = np.sqrt(self._shape.squared_distances(points, guess))
+        reach += margin(self._shape, reach) + self._skin[guess]
+        pairs = self._shape.tree.pairs(points, reach, PAIRS)
+        if pairs is None:
+            for part in np.array_split(np.arange(rows.size), min(PARTS, rows.size)):
+                self._anchor(rows[part], points[:, part], guess[part])
+            return
+        point, piece = pairs
+        squared = measure(self._shape, points, point, piece)
+        self._anchors[:, rows] = points
+        self._last[rows] = lowest_piece(point, piece, squared)
+        self._keep(rows, reach, point, piece, np.sqrt(squared))
+
+    def _keep(self, rows: Ints, reach: Floats, point: Ints, piece: Ints, distance: Floats) -> None:
+        """Stores the nearest of the pieces found within ``reach``."""
+        order = np.lexsort((distance, point))
+        piece, distance = piece[order], distance[order]
+        count = np.bincount(point, minlength=rows.size)
+        start = count.cumsum() - count
+        rank = np.arange(point.size) - start[point]
+        kept = rank < _CANDIDATES
+        self._distances[rows] = np.inf
+        self._distances[rows[point[kept]], rank[kept]] = distance[kept]
+        self._candidates[rows[point[kept]], rank[kept]] = piece[kept]
+        # Where the list is full, everything beyond it is at least as far as the first piece left out.
+        self._radius[rows] = reach
+        full = np.flatnonzero(count > _CANDIDATES)
+        self._radius[rows[full]] = distance[start[full] + _CANDIDATES]

@@ -1,0 +1,78 @@
+"""Gathering, scattering and safe norms shared by the quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from ..topology import Topology
+
+
+def gather(values: Tensor, index: Tensor) -> Tensor:
+    """``values[..., index, :]`` for ``values`` (*batch, N, d) and ``index`` of any shape: (*batch, *index.shape, d).
+
+    ``index_select`` is four times as fast as advanced indexing here, and its backward pass is as fast.
+    """
+    rows = values.index_select(-2, index.reshape(-1))
+    return rows.reshape((*values.shape[:-2], *index.shape, values.shape[-1]))
+
+
+def scatter_sum(values: Tensor, index: Tensor, size: int) -> Tensor:
+    """Sums rows that share a number: ``values`` (*batch, N, d) and ``index`` (N,) to (*batch, size, d)."""
+    zeros: Tensor = values.new_zeros((*values.shape[:-2], size, values.shape[-1]))
+    total: Tensor = zeros.index_add(-2, index, values)
+    return total
+
+
+def cross(a: Tensor, b: Tensor) -> Tensor:
+    """Cross product along the last dimension."""
+    product: Tensor = torch.linalg.cross(a, b, dim=-1)
+    return product
+
+
+def dot(a: Tensor, b: Tensor) -> Tensor:
+    """Scalar product along the last dimension, which is dropped."""
+    return (a * b).sum(-1)
+
+
+def norm(x: Tensor) -> Tensor:
+    """Euclidean length along the last dimension, 0 with zero derivatives of every order where ``x`` is zero.
+
+    ``torch.linalg.vector_norm`` has the same value and gradient, but its second derivative at zero is NaN,
+    and zero vectors are common here (edges of degenerate faces, normals beside flat edges).
+    """
+    squared = dot(x, x)
+    positive = squared > 0
+    # The inner where keeps sqrt away from zero, whose infinite slope would turn the masked zero into NaN.
+    return torch.where(positive, torch.where(positive, squared, 1.0).sqrt(), 0.0)
+
+
+def map_faces(vertices: Tensor, topology: Topology, function: Callable[[Tensor], Tensor]) -> Tensor:
+    """Applies ``function`` to the corner positions of all faces, those with equally many corners at once.
+
+    Args:
+        vertices: (*batch, V, 3).
+        topology: connectivity.
+        function: takes corners (*batch, n, k, 3) of n faces with k corners, returns (*batch, n, d).
+
+    Returns:
+        (*batch, F, d) in the order of the faces.
+    """
+    groups = face_groups(topology)
+    parts = [function(gather(vertices, corners)) for _, corners in groups]
+    if len(parts) == 1:
+        return parts[0]
+    numbers = torch.cat([numbers for numbers, _ in groups])
+    return scatter_sum(torch.cat(parts, dim=-2), numbers, topology.num_faces)
+
+
+def face_groups(topology: Topology) -> list[tuple[Tensor, Tensor]]:
+    """Faces with equally many corners as ``(face numbers (n,), corners (n, k))``: at least one group.
+
+    A mesh without faces has one group of no triangles, so that results still depend on the vertices and
+    ``backward`` works.
+    """
+    nothing = topology.corners[:0]
+    return list(topology.faces_by_size.values()) or [(nothing, nothing.view(0, 3))]

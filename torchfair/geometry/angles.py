@@ -1,0 +1,79 @@
+"""Corner angles of faces and angle defects of vertices."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from ..topology import Topology
+from ._ops import cross, dot, gather, norm, scatter_sum
+from .areas import face_area_vectors
+
+
+def corner_angles(vertices: Tensor, topology: Topology) -> Tensor:
+    """Interior angle of the face at every corner, in radians.
+
+    Corner ``h`` belongs to face ``topology.corner_faces[h]`` and vertex ``topology.corners[h]``.
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity; any polygons, mixed.
+
+    Returns:
+        (*batch, H) in [0, pi], in (0, pi) for triangles that are not degenerate; reflex corners of
+        polygons in (pi, 2 pi), judged against the area vector of the face. A corner beside an edge of
+        length zero has angle 0. Derivatives are 0 at corners with angle exactly 0 or pi (the angle has a
+        kink there) and at corners beside edges of length zero.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    topology.check_vertices(vertices)
+    points = gather(vertices, topology.corners)
+    ahead = _without_size(gather(points, topology.next_corners) - points)
+    behind = torch.zeros_like(ahead).index_copy(-2, topology.next_corners, -ahead)  # from the corner back
+    normal = cross(ahead, behind)
+    sine, cosine = norm(normal), dot(ahead, behind)
+    defined = (sine > 0) | (cosine != 0)
+    angles = torch.atan2(torch.where(defined, sine, 0.0), torch.where(defined, cosine, 1.0))
+    if topology.is_triangular:
+        return angles
+    areas = gather(face_area_vectors(vertices, topology), topology.corner_faces)
+    reflex = (dot(normal, areas) < 0) & (topology.face_sizes > 3)[topology.corner_faces]
+    return torch.where(reflex, 2 * math.pi - angles, angles)
+
+
+def angle_defects(vertices: Tensor, topology: Topology) -> Tensor:
+    """Angle defect of every vertex: the integrated Gaussian curvature of its star, in radians.
+
+    ``2 pi - sum`` of the corner angles at interior vertices, ``pi - sum`` at boundary vertices (the turning
+    angle of the boundary), 0 at isolated vertices. Gauss-Bonnet: they sum to 2 pi times the Euler
+    characteristic, if all faces are planar and no face has an edge of length zero.
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity; any polygons, mixed.
+
+    Returns:
+        (*batch, V), positive where the surface is cone-like, negative where it is saddle-like. Derivatives
+        as for :func:`corner_angles`.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    angles = corner_angles(vertices, topology)
+    total = scatter_sum(angles[..., None], topology.corners, topology.num_vertices).squeeze(-1)
+    flat = math.pi * (2 - topology.is_boundary_vertex.to(vertices.dtype))
+    return torch.where(topology.valences > 0, flat - total, 0.0)
+
+
+def _without_size(edges: Tensor) -> Tensor:
+    """Edges divided by their lengths taken as constants, zero where they have none.
+
+    A constant factor on either side of a corner changes neither the angle nor its derivatives, and without
+    it the squares inside the derivatives of atan2 would underflow for short edges.
+    """
+    lengths = norm(edges.detach())
+    return edges / torch.where(lengths > 0, lengths, 1.0)[..., None]

@@ -1,0 +1,51 @@
+"""Edge vectors and edge lengths."""
+
+from __future__ import annotations
+
+from torch import Tensor
+
+from ..topology import Topology
+from ._ops import norm
+
+
+def edge_vectors(vertices: Tensor, topology: Topology) -> Tensor:
+    r"""Vector ``w - v`` along every edge ``(v, w)``, boundary edges included.
+
+    The left face of the edge traverses it from ``v`` to ``w``::
+
+              left face
+          v -----------> w
+              right face
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity.
+
+    Returns:
+        (*batch, E, 3), same unit; interior edges first. Zero where both ends coincide.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    topology.check_vertices(vertices)
+    v, w = topology.edges.unbind(1)
+    return vertices.index_select(-2, w) - vertices.index_select(-2, v)
+
+
+def edge_lengths(vertices: Tensor, topology: Topology) -> Tensor:
+    """Length of every edge, boundary edges included.
+
+    Differentiable wherever the edge has positive length; at length zero the value is 0 and all derivatives
+    are 0 (a subgradient).
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity.
+
+    Returns:
+        (*batch, E), same unit, >= 0; interior edges first: ``[..., :topology.num_interior_edges]``.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    return norm(edge_vectors(vertices, topology))

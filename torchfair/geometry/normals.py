@@ -1,0 +1,114 @@
+"""Unit normals of faces and vertices."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from ..topology import Topology
+from ._ops import dot, gather, map_faces, norm, scatter_sum
+from .angles import corner_angles
+from .areas import area_vector
+
+DEGENERACY = 4.0
+"""A face is degenerate if ``|A_f| <= DEGENERACY * eps * (sum of its squared edge lengths)``."""
+
+
+def face_normals(vertices: Tensor, topology: Topology) -> Tensor:
+    r"""Unit normal of every face: its area vector divided by its area.
+
+    It points to the side from which the corners run counterclockwise; for polygons that are not planar see
+    :func:`face_area_vectors`.
+
+    A face is *degenerate* if its area vector is not longer than ``4 eps`` times the sum of its squared edge
+    lengths, eps being the rounding unit of the dtype: its direction is then rounding noise. The normal of a
+    degenerate face is the zero vector and all its derivatives are zero.
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity; any polygons, mixed.
+
+    Returns:
+        (*batch, F, 3), length 1 or (degenerate faces) 0. Squared areas must be within the range of the
+        dtype: edges between 1e-9 and 1e9 in float32.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    topology.check_vertices(vertices)
+    return map_faces(vertices, topology, unit_normal)
+
+
+def degenerate_faces(vertices: Tensor, topology: Topology) -> Tensor:
+    """Mask (*batch, F) of the faces without a normal, as defined at :func:`face_normals`.
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity; any polygons, mixed.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    return (face_normals(vertices, topology) == 0).all(-1)
+
+
+def vertex_normals(vertices: Tensor, topology: Topology) -> Tensor:
+    """Unit normal of every vertex: the mean of its face normals weighted by the corner angles.
+
+    With these weights the normal does not depend on how flat faces are cut into triangles.
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity; any polygons, mixed.
+
+    Returns:
+        (*batch, V, 3), length 1. The zero vector, with zero derivatives, at isolated vertices and where the
+        weighted normals cancel or all faces around are degenerate.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    normals = gather(face_normals(vertices, topology), topology.corner_faces)
+    weighted = corner_angles(vertices, topology)[..., None] * normals
+    total = scatter_sum(weighted, topology.corners, topology.num_vertices)
+    # Angles around a vertex are of order 1: anything this small is cancellation.
+    return normalise(total, 64 * torch.finfo(vertices.dtype).eps)
+
+
+def adjacent_normals(vertices: Tensor, topology: Topology) -> tuple[Tensor, Tensor, Tensor]:
+    """Normals of the two faces of every interior edge.
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity; any polygons, mixed.
+
+    Returns:
+        Left normals (*batch, I, 3), right normals (*batch, I, 3), and the mask (*batch, I) of the edges
+        with two faces that are not degenerate: only these carry a dihedral angle.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    normals = face_normals(vertices, topology)
+    left_faces, right_faces = topology.interior_edge_faces.unbind(1)
+    left = normals.index_select(-2, left_faces)
+    right = normals.index_select(-2, right_faces)
+    return left, right, (left != 0).any(-1) & (right != 0).any(-1)
+
+
+def unit_normal(corners: Tensor) -> Tensor:
+    """Unit normals of polygons given by their corners (*batch, n, k, 3): (*batch, n, 3)."""
+    area = area_vector(corners)
+    fixed = corners.detach()
+    sides = fixed.roll(-1, -2) - fixed
+    return normalise(area, DEGENERACY * torch.finfo(corners.dtype).eps * dot(sides, sides).sum(-1))
+
+
+def normalise(x: Tensor, threshold: Tensor | float) -> Tensor:
+    """``x / |x|`` where ``|x| > threshold``, else the zero vector with zero derivatives."""
+    size = norm(x.detach())
+    valid = size > threshold
+    # Dividing by a constant first leaves all derivatives as they are and keeps powers of tiny lengths out of them.
+    scaled = x / torch.where(valid, size, 1.0)[..., None]
+    safe = torch.where(valid[..., None], scaled, 1.0)
+    return torch.where(valid[..., None], safe / norm(safe)[..., None], 0.0)
