@@ -63,8 +63,9 @@ class Topology:
     def __post_init__(self) -> None:
         # Tables that quantities read are filled now: one that is first read inside nested function transforms
         # would keep a tensor that belongs to the transform.
-        for name in _EAGER_TABLES:
-            getattr(self, name)
+        if self.device.type != "meta":
+            for name in _EAGER_TABLES:
+                getattr(self, name)
 
     @classmethod
     def from_faces(cls, faces: object, num_vertices: int | None = None) -> Topology:

@@ -1,0 +1,167 @@
+"""The normal variation as an autograd function: value and gradient in one pass, further derivatives on request."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.autograd import Function
+
+from ..geometry import dual_edge_lengths, edge_lengths
+from ..topology import Topology
+from ._normal_variation_blocks import FACES_PER_BLOCK, blocks_of
+from ._normal_variation_kernel import energy_and_gradient
+
+
+def plain_terms(vertices: Tensor, topology: Topology) -> Tensor:
+    """``l l*`` (*batch, I) of every interior edge, by differentiable functions of the geometry."""
+    lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
+    return lengths * dual_edge_lengths(vertices, topology)
+
+
+def fast_path_serves() -> bool:
+    """Whether :func:`fast_normal_variation` may be called here: not under torch.compile and torch.func.
+
+    The compiler fuses the plain formula by itself. Transforms of torch.func compose with it in any order,
+    but not with autograd functions: a nested ``jacfwd`` gets wrong numbers from them (PyTorch issue 197867).
+    """
+    # torch.autograd.Function.apply asks the same question.
+    return not (torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active())
+
+
+def fast_normal_variation(vertices: Tensor, edge_weights: Tensor | None, topology: Topology) -> Tensor:
+    """E (*batch,) of ``vertices`` (*batch, V, 3); ``edge_weights`` (*batch, I) or fewer dimensions, same dtype."""
+    if edge_weights is not None:
+        batch = torch.broadcast_shapes(vertices.shape[:-2], edge_weights.shape[:-1])
+        vertices = vertices.expand(*batch, -1, -1)
+    with_gradient = vertices.requires_grad and torch.is_grad_enabled()
+    energy: Tensor = _Energy.apply(vertices, edge_weights, topology, with_gradient)[0]
+    return energy
+
+
+class _Energy(Function):
+    """``(vertices, edge_weights, topology, with_gradient) -> (energy, gradient or an empty tensor)``.
+
+    The gradient comes with the value, where much of it has been computed already. It is there for
+    :class:`_Gradient` only and never differentiated itself.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, vertices: Tensor, edge_weights: Tensor | None, topology: Topology, with_gradient: bool) -> Any:
+        energy, gradient = _evaluate(vertices, edge_weights, topology, with_gradient)
+        ctx.mark_non_differentiable(gradient)
+        ctx.save_for_backward(vertices, edge_weights, gradient)
+        ctx.save_for_forward(vertices, edge_weights, gradient)
+        ctx.topology = topology
+        return energy, gradient
+
+    @staticmethod
+    def backward(ctx: Any, *cotangents: Tensor) -> tuple[Tensor | None, Tensor | None, None, None]:
+        vertices, edge_weights, gradient = ctx.saved_tensors
+        along_vertices = along_weights = None
+        if ctx.needs_input_grad[0]:
+            along_vertices = _scaled_gradient(cotangents[0], vertices, edge_weights, gradient, ctx.topology)
+        if ctx.needs_input_grad[1]:
+            terms = cotangents[0][..., None] * plain_terms(vertices, ctx.topology)
+            along_weights = terms.sum_to_size(edge_weights.shape)
+        return along_vertices, along_weights, None, None
+
+    @staticmethod
+    def jvp(ctx: Any, *tangents: Any) -> tuple[Tensor, None]:
+        vertices, edge_weights, gradient = ctx.saved_tensors
+        rate = vertices.new_zeros(vertices.shape[:-2])
+        if tangents[0] is not None:
+            slope = _scaled_gradient(torch.ones_like(rate), vertices, edge_weights, gradient, ctx.topology)
+            rate = rate + (slope * tangents[0]).sum((-2, -1))
+        if tangents[1] is not None:
+            rate = rate + (plain_terms(vertices, ctx.topology) * tangents[1]).sum(-1)
+        return rate, None
+
+
+class _Gradient(Function):
+    """``(factor, vertices, edge_weights, gradient if known, topology) -> factor * gradient``.
+
+    Its derivatives, second ones of E, are those of the plain formula.
+    """
+
+    @staticmethod
+    def forward(
+        ctx: Any, factor: Tensor, vertices: Tensor, edge_weights: Tensor | None, gradient: Tensor, topology: Topology
+    ) -> Tensor:
+        if gradient.shape != vertices.shape:
+            gradient = _evaluate(vertices, edge_weights, topology, with_gradient=True)[1]
+        ctx.save_for_backward(factor, vertices, edge_weights, gradient)
+        ctx.save_for_forward(factor, vertices, edge_weights, gradient)
+        ctx.topology = topology
+        return factor[..., None, None] * gradient
+
+    @staticmethod
+    def backward(ctx: Any, *cotangents: Tensor) -> tuple[Tensor | None, ...]:
+        inputs = [value for value in ctx.saved_tensors[:3] if value is not None]
+        _, pull_back = torch.func.vjp(_plain_gradient(ctx.topology), *inputs)
+        slopes = pull_back(cotangents[0])
+        return slopes[0], slopes[1], slopes[2] if len(slopes) > 2 else None, None, None
+
+    @staticmethod
+    def jvp(ctx: Any, *tangents: Any) -> Tensor:
+        factor, vertices, edge_weights, gradient = ctx.saved_tensors
+        plain = _plain_gradient(ctx.topology)
+        rate = torch.zeros_like(vertices)
+        if tangents[0] is not None:
+            rate = rate + _scaled_gradient(tangents[0], vertices, edge_weights, gradient, ctx.topology)
+        if tangents[1] is not None:
+            # The second derivative is symmetric: it acts on tangents as on cotangents.
+            rate = rate + torch.func.vjp(lambda v: plain(factor, v, edge_weights), vertices)[1](tangents[1])[0]
+        if tangents[2] is not None:
+            rate = rate + plain(factor, vertices, tangents[2])  # E is linear in the weights
+        return rate
+
+
+def _scaled_gradient(
+    factor: Tensor, vertices: Tensor, edge_weights: Tensor | None, gradient: Tensor, topology: Topology
+) -> Tensor:
+    """``factor * gradient``, differentiable again."""
+    if fast_path_serves():
+        scaled: Tensor = _Gradient.apply(factor, vertices, edge_weights, gradient, topology)
+        return scaled
+    return _plain_gradient(topology)(factor, vertices, edge_weights)
+
+
+def _plain_gradient(topology: Topology) -> Callable[..., Tensor]:
+    """``(factor, vertices, edge_weights or None) -> factor * gradient`` by autograd of the plain formula."""
+
+    def gradient(factor: Tensor, vertices: Tensor, edge_weights: Tensor | None = None) -> Tensor:
+        def energy(vertices: Tensor) -> Tensor:
+            terms = plain_terms(vertices, topology)
+            return (terms if edge_weights is None else terms * edge_weights).sum()
+
+        slope: Tensor = torch.func.grad(energy)(vertices)
+        return factor[..., None, None] * slope
+
+    return gradient
+
+
+def _evaluate(
+    vertices: Tensor, edge_weights: Tensor | None, topology: Topology, with_gradient: bool
+) -> tuple[Tensor, Tensor]:
+    """E (*batch,) and its gradient (*batch, V, 3), or an empty tensor in its place."""
+    batch, count = vertices.shape[:-2], topology.num_vertices
+    flat = vertices.reshape(batch.numel(), count, 3)
+    energy = flat.new_empty(flat.shape[0])
+    gradient = flat.new_zeros(3, *flat.shape[:2]) if with_gradient else None
+    if edge_weights is not None:
+        rows = batch if edge_weights.dim() > 1 else ()
+        edge_weights = edge_weights.expand(*rows, -1).reshape(-1, topology.num_interior_edges)
+    # As many meshes at once as fill one block.
+    step = max(1, FACES_PER_BLOCK // max(topology.num_faces, 1)) if flat.is_cpu else max(flat.shape[0], 1)
+    for start in range(0, flat.shape[0], step):
+        part = slice(start, start + step)
+        weights = edge_weights if edge_weights is None or edge_weights.shape[0] == 1 else edge_weights[part]
+        slope = None if gradient is None else gradient[:, part]
+        energy[part] = energy_and_gradient(flat[part], weights, blocks_of(topology), slope)
+    energy = energy.view(batch)
+    if gradient is None:
+        return energy, flat.new_empty(0)
+    return energy, gradient.view(3, *batch, count).movedim(0, -1).contiguous()

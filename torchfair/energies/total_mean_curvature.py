@@ -1,0 +1,49 @@
+"""Total mean curvature: edge lengths times signed dihedral angles."""
+
+from __future__ import annotations
+
+from torch import Tensor
+
+from ..geometry import dihedral_angles, edge_lengths
+from ..topology import Topology
+from .base import EdgeEnergy, weigh
+
+
+def total_mean_curvature_per_edge(vertices: Tensor, topology: Topology, edge_weights: Tensor | None = None) -> Tensor:
+    """Terms ``l a / 2`` of the total mean curvature for every interior edge, times its weight: (*batch, I).
+
+    Arguments, degenerate cases and errors as for :func:`total_mean_curvature`.
+    """
+    lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
+    return weigh(lengths * dihedral_angles(vertices, topology) / 2, edge_weights, topology)
+
+
+def total_mean_curvature(vertices: Tensor, topology: Topology, edge_weights: Tensor | None = None) -> Tensor:
+    """Total mean curvature ``1/2 sum_e l_e a_e`` over the interior edges (paper section 1.2).
+
+    ``l`` is the length and ``a`` the signed dihedral angle, positive where convex. It discretises the
+    integral of ``(k1 + k2)/2`` for any well-shaped mesh of a surface (Cohen-Steiner and Morvan): 4 pi R on
+    a sphere. Turning all faces round changes its sign.
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity; any polygons, mixed.
+        edge_weights: (I,) or (*batch, I) factors of the terms, 1 if left out.
+
+    Returns:
+        (*batch,) of any sign, same unit as the vertices; scales with them, unchanged by rigid motions.
+        Smooth at flat edges. Edges of length zero, on the boundary or beside a degenerate face (see
+        :func:`torchfair.geometry.face_normals`) contribute nothing, with zero derivatives.
+
+    Raises:
+        ShapeError: if ``vertices`` or ``edge_weights`` has the wrong shape or is not floating.
+    """
+    return total_mean_curvature_per_edge(vertices, topology, edge_weights).sum(-1)
+
+
+class TotalMeanCurvature(EdgeEnergy):
+    """Module form of :func:`total_mean_curvature`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
+
+    def per_edge(self, vertices: Tensor) -> Tensor:
+        """Terms (*batch, I), weights included; see :func:`total_mean_curvature_per_edge`."""
+        return total_mean_curvature_per_edge(vertices, self.topology, self.edge_weights)

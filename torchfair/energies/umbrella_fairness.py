@@ -1,0 +1,54 @@
+"""Umbrella fairness: squared umbrella vectors."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from torch import Tensor
+
+from ..geometry import umbrella_vectors
+from ..topology import Topology
+from .base import MeshModule
+
+
+def umbrella_fairness_per_vertex(vertices: Tensor, topology: Topology) -> Tensor:
+    """Squared length of the umbrella vector of every vertex, 0 at boundary and isolated vertices: (*batch, V).
+
+    Arguments and errors as for :func:`umbrella_fairness`.
+    """
+    return umbrella_vectors(vertices, topology).square().sum(-1)
+
+
+def umbrella_fairness(vertices: Tensor, topology: Topology) -> Tensor:
+    """Umbrella fairness ``sum_v |u_v|^2`` over the interior vertices (paper section 5.3, Kobbelt et al. 1998).
+
+    ``u_v`` is the mean of the neighbours of ``v`` minus ``v``: each star counts once, whatever its valence
+    and area. It punishes uneven spacing as well as bending, pulls vertices together, and goes to 0 like h^2
+    when a mesh of a fixed surface is refined regularly to edge length h.
+
+    Args:
+        vertices: positions (*batch, V, 3), any length unit.
+        topology: connectivity; any polygons, mixed.
+
+    Returns:
+        (*batch,) >= 0, unit length^2, unchanged by rigid motions. A quadratic polynomial, smooth everywhere;
+        boundary and isolated vertices contribute nothing, degenerate faces are of no consequence.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    return umbrella_fairness_per_vertex(vertices, topology).sum(-1)
+
+
+class UmbrellaFairness(MeshModule):
+    """Module form of :func:`umbrella_fairness`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
+
+    needs: ClassVar[tuple[str, ...]] = ("is_boundary_vertex", "valences")
+
+    def per_vertex(self, vertices: Tensor) -> Tensor:
+        """Terms (*batch, V); see :func:`umbrella_fairness_per_vertex`."""
+        return umbrella_fairness_per_vertex(vertices, self.topology)
+
+    def forward(self, vertices: Tensor) -> Tensor:
+        """Energy (*batch,) of ``vertices`` (*batch, V, 3)."""
+        return self.per_vertex(vertices).sum(-1)
