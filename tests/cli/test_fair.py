@@ -1,0 +1,145 @@
+"""``torchfair fair``: files written, refusals, what is printed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+from helpers import wavy_grid
+
+from torchfair.cli import main
+from torchfair.energies import normal_variation
+from torchfair.io import load_mesh, save_mesh
+
+QUIET = ["--iterations", "3", "--no-pictures"]
+
+
+@pytest.fixture
+def roof(tmp_path: Path) -> Path:
+    vertices, topology = wavy_grid(7, 6, triangles=True)
+    path = tmp_path / "roof.obj"
+    save_mesh(path, vertices, topology)
+    return path
+
+
+def error_line(capsys: pytest.CaptureFixture[str]) -> str:
+    """The single line that a refused call prints."""
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert err.startswith("torchfair fair: error: ")
+    return err
+
+
+def test_mesh_report_and_pictures_are_written(roof: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "smooth" / "roof.ply"
+    assert main(["fair", str(roof), "-o", str(output), "--iterations", "8"]) == 0
+    out, err = capsys.readouterr()
+    before, after = load_mesh(roof), load_mesh(output)
+    report = json.loads((output.parent / "report.json").read_text())
+    energies = report["energies"]
+    assert after.topology.face_lists() == before.topology.face_lists()
+    for mesh, which in ((before, "before"), (after, "after")):
+        assert energies[which]["normal_variation"] == pytest.approx(
+            float(normal_variation(mesh.vertices, mesh.topology)), rel=1e-12
+        )
+    assert energies["after"]["normal_variation"] < energies["before"]["normal_variation"]
+    assert report["settings"]["boundary"] == "glide"
+    assert {"name", "mean", "largest", "weight", "merit"} <= report["residuals"][0].keys()
+    assert report["history"][0]["iteration"] == 0
+    assert report["versions"]["torch"] == torch.__version__
+    for name in ("before_after.png", "edges.png", "gauss_images.png"):
+        assert (output.parent / name).read_bytes().startswith(b"\x89PNG")
+        assert name in out
+    assert "iteration 0/8" in err
+
+
+def test_existing_files_are_refused_before_any_work_and_kept(
+    roof: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "out.obj"
+    output.write_text("precious")
+    assert main(["fair", str(roof), "-o", str(output), *QUIET]) == 2
+    assert "--force" in error_line(capsys)
+    assert output.read_text() == "precious"
+    assert main(["fair", str(roof), "-o", str(output), "--force", *QUIET]) == 0
+    assert load_mesh(output).topology.num_faces == load_mesh(roof).topology.num_faces
+
+
+def test_existing_report_is_refused(roof: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "report.json").write_text("{}")
+    assert main(["fair", str(roof), "-o", str(tmp_path / "out.obj"), *QUIET]) == 2
+    assert "report.json" in error_line(capsys)
+    assert not (tmp_path / "out.obj").exists()
+    folder = tmp_path / "elsewhere"
+    assert main(["fair", str(roof), "-o", str(tmp_path / "out.obj"), "--results", str(folder), *QUIET]) == 0
+    assert (folder / "report.json").exists()
+
+
+REFUSED = {
+    "no output": ([], "-o"),
+    "unknown option": (["-o", "x.obj", "--smooth"], "--smooth"),
+    "unknown format": (["-o", "x.stp"], "x.stp"),
+    "bad boundary": (["-o", "x.obj", "--boundary", "loose"], "loose"),
+    "bad handle": (["-o", "x.obj", "--handle", "a", "0", "0", "0"], "--handle"),
+    "handle out of range": (["-o", "x.obj", "--handle", "999", "0", "0", "0"], "999"),
+    "negative distance": (["-o", "x.obj", "--distance", "-1"], "-1"),
+    "corner angle": (["-o", "x.obj", "--corner-angle", "200"], "--corner-angle"),
+    "missing reference": (["-o", "x.obj", "--reference", "missing.obj"], "missing.obj"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_requests_end_with_one_line_and_write_nothing(
+    name: str, roof: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "work"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    words, message = REFUSED[name]
+    assert main(["fair", str(roof), *words, *QUIET]) == 2
+    assert message in error_line(capsys)
+    assert list(folder.iterdir()) == []
+
+
+def test_unreadable_input_and_unknown_example(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = str(tmp_path / "x.obj")
+    assert main(["fair", str(tmp_path / "none.obj"), "-o", output]) == 2
+    assert "none.obj" in error_line(capsys)
+    assert main(["fair", "example:palace", "-o", output]) == 2
+    assert "roof" in error_line(capsys)
+
+
+def test_interruption_writes_the_best_mesh(
+    roof: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from torchfair.cli.progress import ProgressDisplay
+
+    original = ProgressDisplay.__call__
+
+    def interrupt(self: ProgressDisplay, record: object) -> None:
+        original(self, record)
+        if record.iteration > 0 and record.accepted:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(ProgressDisplay, "__call__", interrupt)
+    output = tmp_path / "out.obj"
+    assert main(["fair", str(roof), "-o", str(output), "--no-pictures"]) == 0
+    assert "interrupted" in capsys.readouterr().out
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["status"] == "interrupted"
+    assert report["energies"]["after"]["normal_variation"] < report["energies"]["before"]["normal_variation"]
+    assert load_mesh(output).topology.num_faces == load_mesh(roof).topology.num_faces
+
+
+def test_options_reach_the_settings(roof: Path, tmp_path: Path) -> None:
+    words = ["--distance", "none", "--boundary", "fixed", "--planar", "none", "--fairness", "0.7", "--solver", "scipy"]
+    assert main(["fair", str(roof), "-o", str(tmp_path / "out.obj"), *words, *QUIET]) == 0
+    report = json.loads((tmp_path / "report.json").read_text())
+    settings = report["settings"]
+    assert settings["distance_limit"] is None
+    assert (settings["boundary"], settings["planar"], settings["fairness_weight"]) == ("fixed", "none", 0.7)
+    assert report["solver"] == "scipy"
+    assert settings["projection"]["max_iterations"] == 3

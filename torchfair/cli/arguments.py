@@ -1,0 +1,60 @@
+"""Types of command-line arguments, with messages that say what was expected."""
+
+from __future__ import annotations
+
+import argparse
+import math
+
+from .errors import CommandError
+
+
+def count(text: str) -> int:
+    """A whole number, at least 0."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"expected a whole number of at least 0, got {text!r}")
+    return value
+
+
+def positive_count(text: str) -> int:
+    """A whole number, at least 1."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number of at least 1, got {text!r}")
+    return value
+
+
+def non_negative(text: str) -> float:
+    """A finite number, at least 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value >= 0):
+        raise argparse.ArgumentTypeError(f"expected a number of at least 0, got {text!r}")
+    return value
+
+
+def positive_or_none(text: str) -> float | None:
+    """A finite number above 0, or the word none."""
+    if text.lower() == "none":
+        return None
+    value = non_negative(text)
+    if value == 0.0:
+        raise argparse.ArgumentTypeError("expected a number above 0, or none")
+    return value
+
+
+def vertex_target(vertex: str, *place: str) -> tuple[int, list[float]]:
+    """A vertex number and where it is pulled to."""
+    try:
+        return count(vertex), [float(word) for word in place]
+    except (argparse.ArgumentTypeError, ValueError):
+        words = " ".join((vertex, *place))
+        raise CommandError(f"--handle: expected a vertex number and three coordinates, got '{words}'") from None

@@ -1,0 +1,93 @@
+"""``torchfair measure``: how smooth a mesh looks, in numbers."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING, Any
+
+from .arguments import count
+from .plain import to_json
+
+if TYPE_CHECKING:
+    from .measurements import EdgeMeasures, Quantity
+
+NAME = "torchfair measure"
+_DESCRIPTION = (
+    "Prints the energies E and E', curvature, area, lengths and angles of a polygon mesh with their units, and the "
+    "edges that spoil its smoothness most."
+)
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds ``measure`` to the commands."""
+    parser: argparse.ArgumentParser = subparsers.add_parser(
+        "measure", help="print the smoothness of a mesh", description=_DESCRIPTION, allow_abbrev=False
+    )
+    parser.add_argument("input", metavar="INPUT", help="mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of tables")
+    parser.add_argument("--worst", type=count, default=10, metavar="N", help="list the N worst edges (default 10)")
+    parser.add_argument(
+        "--repair", action="store_true", help="orient faces consistently and drop unused vertices first"
+    )
+    parser.set_defaults(run=run, name=NAME)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Reads, measures, prints."""
+    from ..io import load_mesh
+    from .measurements import measure_mesh, worst_edges
+
+    mesh = load_mesh(arguments.input, repair=arguments.repair)
+    quantities = measure_mesh(mesh.vertices, mesh.topology)
+    worst = worst_edges(mesh.vertices, mesh.topology, arguments.worst)
+    if arguments.json:
+        entries = {
+            "file": arguments.input,
+            "repairs": list(mesh.repairs),
+            "units": {quantity.key: quantity.unit for quantity in quantities},
+            "worst_edges": worst,
+        }
+        sys.stdout.write(to_json({**{quantity.key: quantity.value for quantity in quantities}, **entries}))
+    else:
+        for sentence in mesh.repairs:
+            print(f"repaired: {sentence}")
+        print(f"{arguments.input}\n{format_quantities(quantities)}")
+        if worst:
+            print(format_edges(worst))
+    return 0
+
+
+def format_quantities(quantities: list[Quantity]) -> str:
+    """The quantities as lines of text under their headings; counts and pure numbers go without a unit."""
+    width = max(len(quantity.label) for quantity in quantities)
+    lines = []
+    group = None
+    for quantity in quantities:
+        if quantity.group != group:
+            group = quantity.group
+            lines += ["", group]
+        unit = "" if quantity.unit == "dimensionless" else f"  {quantity.unit}"
+        lines.append(f"  {quantity.label:<{width}}  {_number(quantity.value):>12}{unit}")
+    return "\n".join(lines)
+
+
+def format_edges(edges: list[EdgeMeasures]) -> str:
+    """The edges as a table."""
+    lines = [
+        "",
+        "worst edges (l and l |a| in length units of the file, a in degrees, positive where convex)",
+        f"  {'edge':>9} {'vertices':>19} {'l':>12} {'a':>12} {'l |a|':>12}",
+    ]
+    for edge in edges:
+        ends = f"{edge.vertices[0]} - {edge.vertices[1]}"
+        numbers = (edge.length, edge.dihedral_angle_degrees, edge.angle_variation)
+        lines.append(f"  {edge.edge:>9} {ends:>19} " + " ".join(f"{_number(x):>12}" for x in numbers))
+    return "\n".join(lines)
+
+
+def _number(value: float | int | None) -> str:
+    """Six significant digits, whole counts in full, a dash where nothing is defined."""
+    if value is None:
+        return "-"
+    return str(value) if isinstance(value, int) else f"{value:.6g}"
