@@ -64,6 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     outputs.check(force=arguments.force)
     mesh = read_input(arguments.input, arguments.repair)
     reference = read_input(arguments.reference, arguments.repair) if arguments.reference else None
+    outputs.make_folders()
     result, settings = solve(mesh, reference, arguments)
     for sentence in mesh.repairs:
         print(f"repaired: {sentence}")

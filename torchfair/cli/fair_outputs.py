@@ -36,12 +36,15 @@ class Outputs:
         return [self.mesh, self.report, *self.pictures]
 
     def check(self, *, force: bool) -> None:
-        """Refuses unknown mesh formats and, without ``force``, files that exist; makes the folders."""
+        """Refuses unknown mesh formats and, without ``force``, files that exist."""
         if self.mesh.suffix.lower() not in _MESH_FORMATS:
             raise CommandError(f"cannot write '{self.mesh}': choose a name that ends in {', '.join(_MESH_FORMATS)}")
         existing = [str(path) for path in self.paths() if path.exists()]
         if existing and not force:
             raise CommandError(f"{', '.join(existing)} exists: choose another folder, or --force to replace")
+
+    def make_folders(self) -> None:
+        """Makes the folders of all files, so that a solve does not end with nowhere to write."""
         for folder in {self.mesh.parent, self.folder}:
             folder.mkdir(parents=True, exist_ok=True)
 

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import pytest
+import torch
+from helpers import DOUBLE, cube
+
+from torchfair.viewing.camera import fit_camera
+from torchfair.viewing.lines import Surface, visible_lines
+from torchfair.viewing.rasterise import visible_triangles
+from torchfair.viewing.render import MeshView
+
+WALL = torch.tensor([[0.0, 0, 1], [0, 20, 1], [20, 20, 1], [20, 0, 1]], dtype=DOUBLE)
+WALL_TRIANGLES = torch.tensor([[0, 1, 2], [0, 2, 3]])
+
+
+def draw(ends: list[list[list[float]]], widths: list[float], wall: bool = False) -> torch.Tensor:
+    """Lines (one after the other) over nothing or over a wall at depth 1, on 20 x 20 pixels."""
+    points = torch.cat([WALL, torch.tensor(ends, dtype=DOUBLE).view(-1, 3)])
+    triangles = WALL_TRIANGLES if wall else torch.zeros(0, 3, dtype=torch.int64)
+    edges = 4 + torch.arange(2 * len(ends)).view(-1, 2)
+    surface = Surface(points, triangles, visible_triangles(points, triangles, 20, 20))
+    return visible_lines(surface, edges, torch.tensor(widths))
+
+
+def test_line_has_its_width_and_square_ends() -> None:
+    drawn = draw([[[5, 10, 0], [15, 10, 0]]], [4.0])
+    expected = torch.full((20, 20), -1, dtype=torch.int32)
+    expected[8:12, 3:17] = 0
+    assert torch.equal(drawn, expected)
+
+
+@pytest.mark.parametrize(("depth", "seen"), [(0.0, True), (1.0, True), (2.0, False)])
+def test_line_before_on_and_behind_a_wall(depth: float, seen: bool) -> None:
+    drawn = draw([[[5, 10, depth], [15, 10, depth]], [[0, 0, 0], [0, 0, 2]]], [2.0, 0.0], wall=True)
+    assert bool((drawn == 0).any()) == seen
+
+
+def test_line_through_a_wall_is_seen_in_front_of_it() -> None:
+    drawn = draw([[[2, 10, 0], [18, 10, 2]]], [2.0], wall=True)
+    columns = torch.nonzero((drawn == 0).any(0)).squeeze(1)
+    assert columns.min() == 1
+    assert abs(int(columns.max()) - 10) <= 1
+
+
+def test_later_lines_are_on_top() -> None:
+    crossing = [[[5.0, 10, 0], [15, 10, 0]], [[10, 5, 0], [10, 15, 0]]]
+    assert draw(crossing, [2.0, 2.0])[10, 10] == 1
+    assert draw(crossing[::-1], [2.0, 2.0])[10, 10] == 1
+
+
+def test_lines_without_width_or_with_infinite_ends_are_left_out() -> None:
+    lines = [[[5.0, 10, 0], [15, 10, 0]], [[5, 5, torch.nan], [15, 5, 0]]]
+    assert bool((draw(lines, [0.0, 2.0]) == -1).all())
+
+
+def test_point_like_line_is_harmless() -> None:
+    assert bool((draw([[[5, 10, 0], [5, 10, 0]]], [2.0]) == -1).all())
+
+
+@pytest.mark.parametrize("field_of_view", [0.0, 40.0])
+def test_nine_edges_of_a_cube_are_seen(field_of_view: float) -> None:
+    vertices, topology = cube()
+    view = torch.tensor([1.0, -2, 1.5], dtype=DOUBLE)
+    up = torch.tensor([0.0, 0, 1], dtype=DOUBLE)
+    camera = fit_camera(vertices, towards_eye=view, up=up, width=200, height=200, field_of_view=field_of_view)
+    mesh = MeshView(vertices, topology, camera, supersampling=1)
+    surface = Surface(mesh.points, mesh.triangulation.triangles, mesh.triangle_index)
+    drawn = visible_lines(surface, topology.edges, torch.full((12,), 2.0))
+    hidden = vertices[topology.edges] @ (torch.sign(view)) == vertices.matmul(torch.sign(view)).min()
+    counts = torch.bincount(drawn[drawn >= 0], minlength=12)
+    at_hidden_vertex = hidden.any(1)
+    assert at_hidden_vertex.sum() == 3
+    assert bool((counts[at_hidden_vertex] < 12).all())  # nothing but the ends where they meet the outline
+    assert bool((counts[~at_hidden_vertex] > 60).all())

@@ -1,0 +1,7 @@
+"""``python -m torchfair`` is the command ``torchfair``."""
+
+import sys
+
+from .cli import main
+
+sys.exit(main())

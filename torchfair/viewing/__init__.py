@@ -1,0 +1,18 @@
+"""Pictures of meshes without a display: PNG files from a z-buffer in torch; matplotlib sets the words.
+
+Importing this package imports neither matplotlib nor PIL; they are loaded when a picture is written.
+"""
+
+from .camera import Camera as Camera
+from .camera import fit_camera as fit_camera
+from .camera import look_axes as look_axes
+from .lines import EdgeStyle as EdgeStyle
+from .picture_before_after import picture_before_after as picture_before_after
+from .picture_edges import picture_edges as picture_edges
+from .picture_gauss_images import picture_gauss_images as picture_gauss_images
+from .picture_mesh import picture_mesh as picture_mesh
+from .rasterise import Fragments as Fragments
+from .rasterise import rasterise as rasterise
+from .render import MeshView as MeshView
+from .view_direction import ViewDirection as ViewDirection
+from .view_direction import view_direction as view_direction

@@ -1,0 +1,28 @@
+"""Numbers under pictures."""
+
+from __future__ import annotations
+
+from torch import Tensor
+
+from ..energies import angle_variation, normal_variation
+from ..topology import Topology
+
+
+def energy_caption(name: str, vertices: Tensor, topology: Topology, reference: Tensor | None = None) -> str:
+    """``name``, E and E' of one mesh ``(V, 3)``; with a ``reference`` also the change of E against it in percent."""
+    energy = float(normal_variation(vertices, topology))
+    caption = f"{literal(name)}     $E$ = {energy:#.4g}"
+    base = float(normal_variation(reference, topology)) if reference is not None else 0.0
+    if base > 0:
+        caption += f"  ({signed_percent(energy / base - 1)})"
+    return caption + f"     $E'$ = {float(angle_variation(vertices, topology)):#.4g}"
+
+
+def literal(words: str) -> str:
+    """``words`` such that matplotlib does not take them for mathematics."""
+    return words.replace("$", r"\$")
+
+
+def signed_percent(change: float) -> str:
+    """Such as ``-12.3 %``, with a true minus sign."""
+    return f"{100 * change:+.1f} %".replace("-", "\N{MINUS SIGN}")

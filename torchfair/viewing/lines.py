@@ -1,0 +1,134 @@
+"""Mesh edges as lines on the screen: hidden parts removed, any width and colour per edge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from .scan import Spans, span_chunks, triangle_spans
+
+_LONGEST = 4096  # samples along one edge
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeStyle:
+    """How edges are drawn.
+
+    Attributes:
+        colors: ``(E, 3)``, or ``(3,)`` for all.
+        widths: ``(E,)``, or one number for all, in pixels of the final picture; edges of width 0 are left out.
+        order: ``(E,)`` numbers; where lines overlap, the edge with the larger one is on top (ties: the larger edge
+            number). By default the edge number.
+        opacity: 1 hides the surface under a line, 0 leaves no line.
+    """
+
+    colors: Tensor
+    widths: Tensor | float = 0.7
+    order: Tensor | None = None
+    opacity: float = 1.0
+
+
+class Surface(NamedTuple):
+    """What lines are tested against: projected points, triangles, and the triangle at each pixel."""
+
+    points: Tensor
+    triangles: Tensor
+    face_index: Tensor
+
+
+def visible_lines(surface: Surface, edges: Tensor, widths: Tensor) -> Tensor:
+    """Number of the line on top of each pixel, -1 where there is none, ``(height, width)`` int32.
+
+    Of several lines the one with the largest number is on top.
+
+    A line is tested along its middle, one sample per pixel, against the surface there; where the sample is seen,
+    the line is seen in its full width. So lines on a folded or steep surface are not nibbled at, and lines behind
+    do not shine through.
+
+    Args:
+        surface: the surface; its points are also the end points of the edges.
+        edges: ``(E, 2)`` point numbers.
+        widths: ``(E,)`` in pixels; lines of width 0 are left out.
+    """
+    height, width = surface.face_index.shape
+    ends = surface.points.detach()[edges].to(torch.float64)
+    drawn = torch.nonzero((widths > 0) & torch.isfinite(ends).all(-1).all(-1)).squeeze(1)
+    ends, widths = ends[drawn], widths[drawn].to(torch.float64)
+    along = ends[:, 1, :2] - ends[:, 0, :2]
+    lengths = torch.linalg.vector_norm(along, dim=-1)
+    steps = lengths.ceil().clamp(1, _LONGEST).to(torch.int64)
+    seen, first = _seen_samples(surface, ends, steps)
+    quads, triangles = _ribbons(ends, along, lengths, widths)
+    spans = triangle_spans(quads, triangles, width, height)
+    line = spans.triangle // 2
+    sample, sample_step = _positions(ends, along, lengths, steps, spans, line)
+    first_sample, last_sample = first[line], first[line] + steps[line]
+    first_pixel = spans.row * width + spans.start
+    numbers = drawn[line].to(torch.int32)
+    top = torch.full((height * width,), -1, dtype=torch.int32, device=surface.points.device)
+    for span, offset in span_chunks(spans):
+        place = sample.index_select(0, span) + sample_step.index_select(0, span) * offset
+        place = place.clamp_(min=0).to(torch.int64) + first_sample.index_select(0, span)
+        place = torch.minimum(place, last_sample.index_select(0, span))
+        key = torch.where(seen.index_select(0, place), numbers.index_select(0, span), -1)
+        top.scatter_reduce_(0, first_pixel.index_select(0, span) + offset, key, "amax")
+    return top.view(height, width)
+
+
+def _positions(
+    ends: Tensor, along: Tensor, lengths: Tensor, steps: Tensor, spans: Spans, line: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Number of the sample beside the first pixel of each span, and how it changes from pixel to pixel."""
+    tiny = torch.finfo(torch.float64).tiny
+    rate = (along * (steps / (lengths**2).clamp(min=tiny))[:, None])[line]
+    offset = torch.stack([spans.start, spans.row], dim=1) + 0.5 - ends[line, 0, :2]
+    return (offset * rate).sum(-1), rate[:, 0]
+
+
+def _seen_samples(surface: Surface, ends: Tensor, steps: Tensor) -> tuple[Tensor, Tensor]:
+    """Which of ``steps + 1`` samples along each line lie on or before the surface, and the first of each line."""
+    counts = steps + 1
+    first = counts.cumsum(0) - counts
+    line = torch.repeat_interleave(counts)
+    number = torch.arange(line.shape[0], device=line.device) - first[line]
+    position = (number / steps[line].to(ends))[:, None]
+    places = torch.lerp(ends[line, 0], ends[line, 1], position)
+    height, width = surface.face_index.shape
+    column = places[:, 0].floor().clamp(0, width - 1).to(torch.int64)
+    row = places[:, 1].floor().clamp(0, height - 1).to(torch.int64)
+    behind = surface.face_index[row, column]
+    seen = behind < 0
+    over = torch.nonzero(~seen).squeeze(1)
+    if over.shape[0]:
+        depth, slope = _planes(surface, behind[over], places[over, :2])
+        tolerance = 1.5 * slope + 1e-3 * (ends[..., 2].amax() - ends[..., 2].amin())
+        seen[over] = places[over, 2] <= depth + tolerance
+    return seen, first
+
+
+def _planes(surface: Surface, triangle: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
+    """Depth of the planes of triangles at places ``(n, 2)`` on the screen, and how fast it changes per pixel."""
+    corners = surface.points.detach()[surface.triangles[triangle]].to(torch.float64)
+    origin, a, b = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = torch.linalg.cross(a, b)
+    across = normal[:, :2] / torch.where(normal[:, 2:] == 0, 1, -normal[:, 2:])
+    depth = origin[:, 2] + ((places - origin[:, :2]) * across).sum(-1)
+    nearest, farthest = corners[..., 2].amin(1), corners[..., 2].amax(1)
+    slope = torch.minimum(torch.linalg.vector_norm(across, dim=-1), farthest - nearest)
+    return torch.clamp(depth, nearest, farthest), slope
+
+
+def _ribbons(ends: Tensor, along: Tensor, lengths: Tensor, widths: Tensor) -> tuple[Tensor, Tensor]:
+    """Each line as two triangles around its middle, lengthened by half its width at both ends."""
+    forward = torch.where(lengths[:, None] > 0, along / lengths.clamp(min=1e-12)[:, None], 0)
+    forward = forward * (widths / 2)[:, None]
+    sideways = torch.stack([-forward[:, 1], forward[:, 0]], dim=-1)
+    start, stop = ends[:, 0, :2] - forward, ends[:, 1, :2] + forward
+    corners = torch.stack([start - sideways, stop - sideways, stop + sideways, start + sideways], dim=1)
+    quads = torch.nn.functional.pad(corners.reshape(-1, 2), (0, 1))
+    base = 4 * torch.arange(ends.shape[0], device=ends.device)[:, None]
+    triangles = torch.cat([base, base + 1, base + 2, base, base + 2, base + 3], dim=1)
+    return quads, triangles.view(-1, 3)

@@ -1,0 +1,72 @@
+"""A mesh before and after, in daylight and as a mirror."""
+
+from __future__ import annotations
+
+import os
+
+from torch import Tensor
+
+from ..topology import Topology
+from .camera import fit_camera
+from .captions import energy_caption
+from .render import MeshView, one_mesh
+from .shading import mirror_directions, shade_faces, stripe_colors, stripe_frequency, stripe_values
+from .sheet import CAPTION, GAP, MARGIN, Sheet
+from .view_direction import ViewDirection, view_direction
+from .wireframe import outline, quiet_edges
+
+
+def picture_before_after(
+    path: str | os.PathLike[str],
+    before: Tensor,
+    after: Tensor,
+    topology: Topology,
+    title: str = "",
+    *,
+    view: ViewDirection | None = None,
+    width: int = 1600,
+    overwrite: bool = False,
+) -> tuple[int, int]:
+    """Writes a PNG with the mesh before (left) and after (right): flat shaded above, mirroring stripes below.
+
+    All four views share one camera, and both reflections the same striped surroundings: a smooth surface shows
+    smooth stripes. The captions give E (normal variation) and E' (angle variation).
+
+    Args:
+        path: the PNG file.
+        before: positions ``(V, 3)``.
+        after: positions ``(V, 3)``.
+        topology: connectivity of both.
+        title: words on top; none by default.
+        view: where to look from; by default :func:`view_direction` of the mesh before.
+        width: columns of pixels of the file; the number of rows follows from the shape of the mesh.
+        overwrite: whether an existing file may be replaced.
+
+    Returns:
+        Width and height of the picture in pixels.
+
+    Raises:
+        ShapeError: if positions are not one mesh that fits the topology.
+        MeshFileError: if the file cannot be written.
+    """
+    before, after = one_mesh(before, topology), one_mesh(after, topology)
+    towards_eye, up = view or view_direction(before, topology)
+    panel = (width - 2 * MARGIN - GAP) // 2
+    camera = fit_camera(before, after, towards_eye=towards_eye, up=up, width=panel)
+    axis = camera.axes[0].to(before)
+    frequency = stripe_frequency(mirror_directions(before, topology, camera) @ axis, topology)
+
+    row = CAPTION + camera.height
+    sheet = Sheet(width, 2 * row + MARGIN, title)
+    sheet.note("daylight", MARGIN, sheet.top)
+    sheet.note("mirror", MARGIN, sheet.top + row)
+    captions = energy_caption("before", before, topology), energy_caption("after", after, topology, before)
+    for column, (vertices, caption) in enumerate(zip((before, after), captions, strict=True)):
+        left = MARGIN + column * (panel + GAP)
+        mesh = MeshView(vertices, topology, camera)
+        sheet.caption(caption, left, sheet.top, panel)
+        daylight = mesh.paint(shade_faces(vertices, topology, camera), edges=quiet_edges(mesh))
+        sheet.image(daylight, left, sheet.top + CAPTION)
+        stripes = stripe_values(mirror_directions(vertices, topology, camera) @ axis, frequency)
+        sheet.image(mesh.paint(stripe_colors(stripes), edges=outline(mesh)), left, sheet.top + row + CAPTION)
+    return sheet.write(path, overwrite=overwrite)

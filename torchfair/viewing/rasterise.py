@@ -1,0 +1,131 @@
+"""Which triangle covers each pixel: a z-buffer in plain torch, exact to the pixel and deterministic."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from ..errors import ShapeError
+from .scan import Spans, span_chunks, triangle_spans
+
+_DEPTH_LEVELS = (1 << 31) - 1
+_BAND = 1 << 16  # pixels worked on at a time on a CPU: keeps every temporary inside the cache
+_LOW_BITS = (1 << 32) - 1
+_FAR = torch.iinfo(torch.int64).max  # all low bits set
+
+
+class Fragments(NamedTuple):
+    """What :func:`rasterise` sees through every pixel; row 0 is the top row.
+
+    Attributes:
+        face_index: ``(height, width)`` int64, the nearest triangle, -1 where there is none.
+        depth: ``(height, width)``, depth of that triangle at the pixel centre, infinite where there is none.
+        barycentric: ``(height, width, 3)``, affine weights of its three corners at the pixel centre, zero where
+            there is none. They sum to 1.
+    """
+
+    face_index: Tensor
+    depth: Tensor
+    barycentric: Tensor
+
+
+def rasterise(points: Tensor, triangles: Tensor, width: int, height: int) -> Fragments:
+    """Nearest triangle, its depth and barycentric weights at every pixel centre.
+
+    Pixel ``(row j, column i)`` is the square ``[i, i+1] x [j, j+1]`` and is sampled at its centre. Triangles that
+    share an edge never both cover a pixel along it and leave no gap. Both sides of a triangle are drawn. Equal
+    depths (to ``2^-31`` of the depth range) go to the triangle with the smaller number, on every device.
+
+    Depth and weights are differentiable with respect to ``points``; which triangle is seen is not (it is constant
+    almost everywhere).
+
+    Args:
+        points: ``(V, 3)`` pixel coordinates ``x`` (right), ``y`` (down) and a depth that is affine over the
+            screen and grows away from the eye: distance for parallel projection, ``-1 / distance`` for perspective.
+        triangles: ``(T, 3)`` int64 point numbers. A triangle without area on the screen, or with a corner that is
+            not finite, covers nothing.
+        width: number of columns, at least 1.
+        height: number of rows, at least 1.
+
+    Raises:
+        ShapeError: if an argument has another shape.
+    """
+    face_index = visible_triangles(points, triangles, width, height)
+    barycentric, depth = interpolate(points, triangles, face_index)
+    return Fragments(face_index, depth, barycentric)
+
+
+def visible_triangles(points: Tensor, triangles: Tensor, width: int, height: int) -> Tensor:
+    """The ``face_index`` of :func:`rasterise` alone."""
+    _check(points, triangles, width, height)
+    nearest = torch.full((height * width,), _FAR, device=points.device)
+    spans = triangle_spans(points, triangles, width, height)
+    first_pixel = spans.row * width + spans.start
+    first_level, level_step = _quantise(spans)
+    for span, offset in span_chunks(spans):
+        level = first_level.index_select(0, span) + level_step.index_select(0, span) * offset
+        key = (level.to(torch.int64) << 32) | spans.triangle.index_select(0, span)
+        nearest.scatter_reduce_(0, first_pixel.index_select(0, span) + offset, key, "amin")
+    seen = nearest.bitwise_and_(_LOW_BITS)  # in place: the buffer is large
+    return seen.masked_fill_(seen == _LOW_BITS, -1).view(height, width)
+
+
+def interpolate(points: Tensor, triangles: Tensor, face_index: Tensor) -> tuple[Tensor, Tensor]:
+    """Barycentric weights ``(height, width, 3)`` and depth ``(height, width)`` of the triangles in ``face_index``.
+
+    Differentiable with respect to ``points`` with ``face_index`` held fixed.
+    """
+    height, width = face_index.shape
+    table = _affine_tables(points, triangles)
+    x = torch.arange(width, device=points.device, dtype=points.dtype) + 0.5
+    y = torch.arange(height, device=points.device, dtype=points.dtype) + 0.5
+    bands = max(1, height * width // _BAND) if points.device.type == "cpu" else 1
+    weights, depths = [], []
+    for index, rows in zip(face_index.tensor_split(bands), y.tensor_split(bands), strict=True):
+        seen = table.index_select(0, torch.where(index < 0, triangles.shape[0], index).view(-1))
+        x0, y0, z0, x1, y1, z1, x2, y2, z2 = seen.view(*index.shape, 9).unbind(-1)
+        dx, dy = x - x0, rows[:, None] - y0
+        first, second = x1 * dx + y1 * dy, x2 * dx + y2 * dy
+        covered = (index >= 0).to(points.dtype)
+        weights.append(torch.stack([covered - first - second, first, second], dim=-1))
+        depths.append(z0 + first * z1 + second * z2)
+    return torch.cat(weights), torch.cat(depths)
+
+
+def _affine_tables(points: Tensor, triangles: Tensor) -> Tensor:
+    """One row ``(x0, y0, z0, x1, y1, z1, x2, y2, z2)`` for each triangle and a last one for the background.
+
+    The weight of corner 1 is ``x1 (x - x0) + y1 (y - y0)``, that of corner 2 likewise, and the depth is
+    ``z0 + weight1 z1 + weight2 z2``.
+    """
+    corners = points[triangles]
+    origin, (a, b) = corners[:, 0], (corners[:, 1:] - corners[:, :1]).unbind(1)
+    doubled_area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    flat = doubled_area == 0
+    inverse = torch.where(flat, 0, 1 / torch.where(flat, 1, doubled_area))
+    first = torch.stack([b[:, 1] * inverse, -b[:, 0] * inverse, a[:, 2]], dim=1)
+    second = torch.stack([-a[:, 1] * inverse, a[:, 0] * inverse, b[:, 2]], dim=1)
+    background = points.new_tensor([[0.0, 0, torch.inf, 0, 0, 0, 0, 0, 0]])
+    return torch.cat([torch.cat([origin, first, second], dim=1), background])
+
+
+def _quantise(spans: Spans) -> tuple[Tensor, Tensor]:
+    """Depths of spans as levels in ``0 .. 2^31 - 1``: first pixel and step."""
+    if spans.length.shape[0] == 0:
+        return spans.depth, spans.depth_step
+    last = spans.depth + spans.depth_step * (spans.length - 1)
+    nearest = torch.minimum(spans.depth, last).amin()
+    extent = torch.maximum(spans.depth, last).amax() - nearest
+    scale = _DEPTH_LEVELS / torch.where(extent > 0, extent, 1)
+    return (spans.depth - nearest) * scale, spans.depth_step * scale
+
+
+def _check(points: Tensor, triangles: Tensor, width: int, height: int) -> None:
+    if points.ndim != 2 or points.shape[1] != 3 or not points.is_floating_point():
+        raise ShapeError("points", "a floating tensor (V, 3)", f"{tuple(points.shape)} {points.dtype}")
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.is_floating_point():
+        raise ShapeError("triangles", "an integer tensor (T, 3)", f"{tuple(triangles.shape)} {triangles.dtype}")
+    if width < 1 or height < 1:
+        raise ShapeError("width and height", "at least one pixel each", (width, height))

@@ -1,0 +1,156 @@
+"""A mesh seen through a camera: visibility worked out once, coloured as often as wanted."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from functools import cached_property
+
+import torch
+from torch import Tensor
+
+from ..errors import ShapeError
+from ..topology import Topology
+from .camera import Camera
+from .lines import EdgeStyle, Surface, visible_lines
+from .rasterise import interpolate, visible_triangles
+from .triangulate import Triangulation, triangulate
+
+Color = tuple[float, float, float]
+
+WHITE: Color = (1.0, 1.0, 1.0)
+_BAND = 1 << 17  # samples coloured at a time: keeps every temporary inside the cache
+
+
+class MeshView:
+    """One mesh ``(V, 3)`` seen through one camera, with several samples per pixel.
+
+    Args:
+        vertices: ``(V, 3)``.
+        topology: connectivity, any polygons.
+        camera: the view, in pixels of the final picture.
+        supersampling: samples per pixel along each side; 1 for none.
+    """
+
+    def __init__(self, vertices: Tensor, topology: Topology, camera: Camera, *, supersampling: int = 3) -> None:
+        self.vertices = one_mesh(vertices, topology)
+        self.topology = topology
+        self.camera = camera
+        self.supersampling = supersampling
+        self._fine = camera.enlarged(supersampling)
+
+    @cached_property
+    def triangulation(self) -> Triangulation:
+        """The triangles that are drawn."""
+        return triangulate(self.vertices, self.topology)
+
+    @cached_property
+    def points(self) -> Tensor:
+        """``(V, 3)`` positions on the screen in samples, and depth."""
+        return self._fine.project(self.vertices)
+
+    @cached_property
+    def triangle_index(self) -> Tensor:
+        """Triangle of :attr:`triangulation` at each sample, -1 where there is none."""
+        return visible_triangles(self.points, self.triangulation.triangles, self._fine.width, self._fine.height)
+
+    @cached_property
+    def face_index(self) -> Tensor:
+        """Face at each sample (int32), -1 where there is none."""
+        faces = torch.nn.functional.pad(self.triangulation.faces.to(torch.int32), (0, 1), value=-1)
+        return faces[self.triangle_index]  # -1 picks the last
+
+    def paint(self, face_colors: Tensor, *, edges: EdgeStyle | None = None, background: Color = WHITE) -> Tensor:
+        """The picture ``(height, width, 3)`` in 0..1, float32.
+
+        Args:
+            face_colors: ``(F, 3)`` one colour per face, as it shall appear (see
+                :func:`~torchfair.viewing.shading.shade_faces`).
+            edges: how to draw edges; none by default.
+            background: colour where nothing is seen.
+        """
+        table = torch.cat([face_colors.new_tensor([background]), face_colors]).to(torch.float32)
+        if edges is not None:
+            lines, line_colors = self._lines(edges)
+        bands = []
+        for band in self._bands():
+            samples = table.index_select(0, (self.face_index[band] + 1).view(-1))
+            if edges is not None:
+                line = lines[band].reshape(-1)
+                covered = torch.nonzero(line >= 0).squeeze(1)
+                ink = line_colors.index_select(0, line[covered])
+                samples[covered] = torch.lerp(samples[covered], ink, edges.opacity)
+            bands.append(self._average(samples))
+        return torch.cat(bands)
+
+    def paint_vertices(
+        self, vertex_colors: Tensor, *, face_shades: Tensor | None = None, background: Color = WHITE
+    ) -> Tensor:
+        """The picture ``(height, width, 3)`` with colours blended across each triangle from its corners.
+
+        Args:
+            vertex_colors: ``(V, 3)`` in 0..1.
+            face_shades: ``(F,)`` brightness that multiplies the colours; 1 by default.
+            background: colour where nothing is seen.
+        """
+        colors = vertex_colors.to(torch.float32)
+        shades = colors.new_ones(self.topology.num_faces) if face_shades is None else face_shades.to(torch.float32)
+        corners = torch.nn.functional.pad(self.triangulation.triangles, (0, 0, 0, 1))
+        weights = self._surface_weights().to(torch.float32)
+        bands = []
+        for band in self._bands():
+            corner = corners[self.triangle_index[band]]
+            blended = (weights[band][..., k, None] * colors[corner[..., k]] for k in range(3))
+            face = self.face_index[band]
+            shade = torch.nn.functional.pad(shades, (0, 1))[face]
+            samples = functools.reduce(torch.add, blended) * shade[..., None]
+            samples = torch.where((face >= 0)[..., None], samples, samples.new_tensor(background))
+            bands.append(self._average(samples))
+        return torch.cat(bands).clamp(0, 1)
+
+    def _surface_weights(self) -> Tensor:
+        """Barycentric weights on the surface in space (on the screen they are distorted by perspective)."""
+        triangles = self.triangulation.triangles
+        weights, _ = interpolate(self.points, triangles, self.triangle_index)
+        if not self.camera.perspective:
+            return weights
+        corners = torch.nn.functional.pad(triangles, (0, 0, 0, 1))[self.triangle_index]
+        weights = weights * -self.points[:, 2][corners]  # depth is -1 / distance
+        total = weights.sum(-1, keepdim=True)
+        return weights / torch.where(total > 0, total, 1)
+
+    def _lines(self, style: EdgeStyle) -> tuple[Tensor, Tensor]:
+        """Position in the drawing order of the edge on top of each sample, and the colours in that order."""
+        count, device = self.topology.num_edges, self.points.device
+        widths = torch.as_tensor(style.widths, dtype=torch.float64, device=device).expand(count)
+        widths = torch.where(widths > 0, (widths * self.supersampling).clamp(min=1), 0)
+        order = (
+            torch.arange(count, device=device) if style.order is None else style.order.to(device).argsort(stable=True)
+        )
+        surface = Surface(self.points, self.triangulation.triangles, self.triangle_index)
+        lines = visible_lines(surface, self.topology.edges[order], widths[order])
+        return lines, style.colors.to(device, torch.float32).expand(count, 3)[order]
+
+    def _bands(self) -> Iterator[slice]:
+        """The rows of samples, a whole number of pixel rows at a time."""
+        rows = max(1, _BAND // (self._fine.width * self.supersampling)) * self.supersampling
+        return (slice(top, top + rows) for top in range(0, self._fine.height, rows))
+
+    def _average(self, samples: Tensor) -> Tensor:
+        """Mean colour of the samples of each pixel of some rows."""
+        factor = self.supersampling
+        cells = samples.view(-1, factor, self.camera.width, factor, 3)
+        parts = (cells[:, row, :, column] for row in range(factor) for column in range(factor))
+        return functools.reduce(torch.add, parts) / factor**2
+
+
+def one_mesh(vertices: Tensor, topology: Topology) -> Tensor:
+    """Positions ``(V, 3)`` of one mesh, detached.
+
+    Raises:
+        ShapeError: if they are a batch, or do not fit the topology.
+    """
+    topology.check_vertices(vertices)
+    if vertices.ndim != 2:
+        raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3), not a batch", tuple(vertices.shape))
+    return vertices.detach()
