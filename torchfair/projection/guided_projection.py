@@ -15,6 +15,7 @@ from .result import ProjectionResult
 from .settings import ProjectionSettings
 from .system import Structure
 from .term import ElementTerm
+from .threads import threads_for
 
 
 def guided_projection(
@@ -99,7 +100,7 @@ class GuidedProjection:
         """Iterates from ``blocks``; see :func:`guided_projection`. The linear solver is that of the constructor."""
         if Layout.of(blocks) != self.layout:
             raise ShapeError("blocks", str(self.layout.sizes), str(Layout.of(blocks).sizes))
-        with torch.no_grad():
+        with torch.no_grad(), threads_for(self.layout.num_unknowns, self.structure.free.device):
             run = Iteration(self, blocks, settings or ProjectionSettings(), callback, observe, guard)
             return run.run()
 

@@ -15,7 +15,7 @@ from .scipy_direct import ScipyDirect
 
 _DENSE_LIMIT = 120
 _RSLAB_LIMIT = 200_000
-_SCIPY_LIMIT = 12_000
+_SCIPY_LIMIT = 30_000
 
 
 def choose_solver(name: str, structure: Structure) -> LinearSolver:

@@ -10,6 +10,8 @@ from ...errors import SingularSystemError
 from ..system import LinearSystem, Structure
 from .base import Step
 
+_SMALL = 2_000_000  # entries of the lower triangle below which one thread factors as fast as several
+
 
 class RslabDirect:
     """Supernodal ``L D L^T`` (``pip install torchfair[direct]``); several times faster than SuperLU.
@@ -47,7 +49,7 @@ class RslabDirect:
         if not np.isfinite(values).all():
             raise SingularSystemError("the normal matrix is not finite")
         try:
-            factor = self._symbolic.factor(values)
+            factor = self._symbolic.factor(values, threads=1 if values.size < _SMALL else None)
         except (RuntimeError, ValueError) as error:
             raise SingularSystemError(f"rslab: {error}") from None
         if factor.inertia[0] != self._pattern.num_unknowns:
