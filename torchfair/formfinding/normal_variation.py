@@ -21,6 +21,9 @@ from .settings import FairSettings
 
 Mesh = tuple[Tensor, Topology]
 
+_SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
+_LARGEST_SHARE = 1.3
+
 
 @dataclass(frozen=True)
 class FairResult:
@@ -95,28 +98,30 @@ def minimise_normal_variation(
     def observe(state: State) -> dict[str, float]:
         return {"normal_variation": normalisation.length * float(normal_variation(state["vertices"], topology))}
 
-    state, preparation = problem.vertices, []
-    for share in problem.shares():
-        final = share == 1.0
-        result = guided_projection(
-            problem.blocks(state),
+    runs: list[ProjectionResult] = []
+    shares = problem.shares()
+    while shares:
+        share = shares.pop(0)
+        run = guided_projection(
+            problem.blocks(runs[-1].blocks["vertices"] if runs else problem.vertices),
             problem.terms(share),
             fixed=problem.fixed,
-            settings=settings.projection if final else settings.stage(),
+            settings=settings.stage() if share < 1.0 else settings.projection,
             callback=callback,
             observe=observe,
             guard=problem.keeps_faces,
         )
-        state = result.blocks["vertices"]
-        if not final:
-            preparation.append(result)
-        if result.status in (Status.INTERRUPTED, Status.CALLBACK):
+        runs.append(run)
+        if run.status in (Status.INTERRUPTED, Status.CALLBACK):
             break
+        if not shares and share < _LARGEST_SHARE and not problem.is_planar(run.blocks["vertices"]):
+            shares.append(share + _SHARE_STEP)
+    state = runs[-1].blocks["vertices"]
     moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(state))
     return FairResult(
         vertices=moved.to(vertices),
-        projection=result,
-        preparation=preparation,
+        projection=runs[-1],
+        preparation=runs[:-1],
         before=fair_measures(start, start, topology, problem, normalisation),
         after=fair_measures(moved, start, topology, problem, normalisation),
         notes=problem.notes,

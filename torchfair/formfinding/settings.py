@@ -14,7 +14,7 @@ FORMULATIONS = ("reduced", "lifted")
 
 def _default_projection() -> ProjectionSettings:
     return ProjectionSettings(
-        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=5e-4, patience=4
+        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=1e-3, patience=3
     )
 
 

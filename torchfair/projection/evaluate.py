@@ -1,4 +1,4 @@
-"""The merit of a state, term by term."""
+"""Reports on a state, term by term."""
 
 from __future__ import annotations
 
@@ -9,19 +9,8 @@ import torch
 from ..errors import TorchfairError
 from .layout import State
 from .result import TermResidual
-from .system import LinearSystem, Structure
+from .system import Evaluation, Structure
 from .term import ElementTerm
-
-
-def merit(terms: Sequence[ElementTerm], state: State) -> float:
-    """Sum of all terms; infinity where a residual is not finite, so that such a state is never accepted."""
-    total = 0.0
-    for term in terms:
-        if not term.num_elements or term.weight == 0.0:
-            continue
-        arguments = term.arguments(state)
-        total += float(term.contributions(arguments, term.values(arguments)).sum())
-    return total if total == total and total != float("-inf") else float("inf")
 
 
 def residual_table(terms: Sequence[ElementTerm], state: State) -> list[TermResidual]:
@@ -52,16 +41,21 @@ def first_bad_elements(term: ElementTerm, state: State) -> list[int]:
     return [int(i) for i in torch.nonzero(bad).squeeze(1)]
 
 
-def check_start(terms: Sequence[ElementTerm], state: State, value: float) -> None:
-    """Raises TorchfairError if the state or its merit ``value`` is not finite; names the block or the term."""
+def check_start(structure: Structure, start: Evaluation) -> None:
+    """Raises TorchfairError if the start or its merit is not finite, or a linear term is not; names block or term."""
+    state = start.state
     for name, block in state.items():
         bad = torch.nonzero(~torch.isfinite(block).all(1)).squeeze(1).tolist()
         if bad:
             raise TorchfairError(f"block '{name}' is not finite in rows {bad[:5]}: repair the start")
-    if value != float("inf"):
+    if start.merit != float("inf"):
+        affine = structure.affine
+        misfit = affine.misfit(state, structure.layout.flatten(state)) if affine is not None else None
+        if misfit is not None:
+            raise TorchfairError(f"term '{misfit}' is declared linear, but its residual is not: leave out linear=True")
         return
-    for term in terms:
-        bad = first_bad_elements(term, state) if term.num_elements and term.weight else []
+    for term in structure.terms:
+        bad = first_bad_elements(term, state)
         if bad:
             raise TorchfairError(
                 f"the residual of term '{term.name}' is not finite at the start, elements {bad[:5]}: "
@@ -70,11 +64,14 @@ def check_start(terms: Sequence[ElementTerm], state: State, value: float) -> Non
     raise TorchfairError("the merit overflows at the start although every residual is finite: lower the weights")
 
 
-def culprit(structure: Structure, system: LinearSystem, state: State) -> str:
+def culprit(structure: Structure, state: State) -> str:
     """The term that most likely makes the system singular: one that is not finite, or the stiffest."""
-    sizes = [float(torch.nan_to_num(j, nan=float("inf")).abs().max()) for j in system.jacobians]
+    sizes = []
+    for term in structure.terms:
+        values, jacobians = term.derivatives(term.arguments(state))
+        scaled = jacobians * term.scaled_weights(values.square().sum(1)).sqrt()[:, None, None]
+        sizes.append(float(torch.nan_to_num(scaled, nan=float("inf")).abs().max()))
     worst = max(range(len(sizes)), key=sizes.__getitem__)
-    term = structure.compiled[worst].term
-    bad = first_bad_elements(term, state)
+    bad = first_bad_elements(structure.terms[worst], state)
     where = f", not finite at elements {bad[:5]}" if bad else f", largest derivative {sizes[worst]:.3g}"
-    return f"term '{term.name}'{where}"
+    return f"term '{structure.terms[worst].name}'{where}"

@@ -13,12 +13,12 @@ from torch import Tensor
 
 from ..errors import SingularSystemError
 from .damping import Damping
-from .evaluate import check_start, culprit, merit, residual_table
+from .evaluate import check_start, culprit, residual_table
 from .layout import State
 from .linear import Step
 from .result import IterationRecord, ProjectionResult, Status
 from .settings import ProjectionSettings
-from .system import LinearSystem
+from .system import Evaluation, LinearSystem
 
 if TYPE_CHECKING:
     from .guided_projection import GuidedProjection
@@ -30,6 +30,7 @@ Guard = Callable[[State, State], bool]
 _LEAST_GAIN = 1e-4
 _TIGHTEST_ACCURACY = 1e-8
 _LONGEST_EXTRAPOLATION = 3.0
+_PATIENCE_WHEN_DAMPED = 4
 
 
 class Iteration:
@@ -48,10 +49,9 @@ class Iteration:
         self.callback, self.observe, self.guard = callback, observe, guard
         self.begin = time.perf_counter()
         self.timings = {"linearise": 0.0, "solve": 0.0, "merit": 0.0}
-        self.state: dict[str, Tensor] = {name: block.detach().clone() for name, block in blocks.items()}
-        self.merit = self._merit(self.state)
-        check_start(problem.terms, self.state, self.merit)
-        self.initial_residuals = residual_table(problem.terms, self.state)
+        self.best = self._evaluate({name: block.detach().clone() for name, block in blocks.items()})
+        check_start(problem.structure, self.best)
+        self.initial_residuals = residual_table(problem.terms, self.best.state)
         self.damping = Damping(settings.initial_damping)
         self.accuracy = settings.accuracy
         self.quantities: dict[str, float] = {}
@@ -62,10 +62,10 @@ class Iteration:
         """Iterates until a tolerance, a limit, the callback or an interruption ends it."""
         detail = ""
         try:
-            start = IterationRecord(0, self.merit, math.nan, math.nan, 0.0, math.nan, True, 0, 0.0)
+            start = IterationRecord(0, self.best.merit, math.nan, math.nan, 0.0, math.nan, True, 0, 0.0)
             if self._record(start):
                 status = Status.CALLBACK
-            elif self.merit == 0.0:
+            elif self.best.merit == 0.0:
                 status = Status.ZERO_MERIT
             else:
                 self.problem.prepare()
@@ -73,10 +73,10 @@ class Iteration:
         except KeyboardInterrupt:
             status = Status.INTERRUPTED
         return ProjectionResult(
-            blocks=self.state,
+            blocks=dict(self.best.state),
             status=status,
             message=f"{status.value}; {detail}" if detail else status.value,
-            residuals=residual_table(self.problem.terms, self.state),
+            residuals=residual_table(self.problem.terms, self.best.state),
             initial_residuals=self.initial_residuals,
             history=self.history,
             solver=self.problem.solver.name,
@@ -87,7 +87,7 @@ class Iteration:
         number = 0
         while True:
             with self._timed("linearise"):
-                system = self.problem.structure.linearise(self.state)
+                system = self.problem.structure.linearise(self.best)
                 scale = self._scale(system)
             gradient = float((system.gradient.abs() / scale.sqrt()).max())
             if gradient <= self.settings.gradient_tolerance:
@@ -100,7 +100,7 @@ class Iteration:
                     return Status.TIME_LIMIT, ""
                 step = self._damped_step(system, scale)
                 if step is None:
-                    return Status.SINGULAR, culprit(self.problem.structure, system, self.state)
+                    return Status.SINGULAR, culprit(self.problem.structure, self.best.state)
                 number += 1
                 accepted, status = self._try(system, scale, step, number, gradient)
                 if status is not None:
@@ -120,27 +120,28 @@ class Iteration:
         self, system: LinearSystem, scale: Tensor, step: Step, number: int, gradient: float
     ) -> tuple[bool, Status | None]:
         """Takes the step if it lowers the merit; says whether it did, and why to stop."""
-        damping, before = self.damping.value, self.merit
+        damping, before = self.damping.value, self.best.merit
         change = step.change * self.problem.structure.free
         predicted = 0.5 * float(change @ (damping * scale * change - system.gradient + step.remainder))
-        flat = self.problem.layout.flatten(self.state)
-        trial, value = self._evaluate(flat + change)
-        gain = (before - value) / predicted if predicted > 0.0 else -math.inf
-        accepted = value < before and gain > _LEAST_GAIN
+        flat = self.problem.layout.flatten(self.best.state)
+        trial = self._trial(flat + change)
+        fall = -math.inf if trial is None else before - trial.merit
+        gain = fall / predicted if predicted > 0.0 else -math.inf
         size, reach = float(change.abs().max()), float(flat.abs().max())
-        if accepted:
-            self.state, self.merit = trial, value
+        accepted = fall > 0.0 and gain > _LEAST_GAIN
+        if accepted and trial is not None:
+            self.best = trial
             self._extrapolate(flat, change, gain)
             self.damping.accept(gain)
         record = IterationRecord(
-            number, self.merit, damping, gain, size, gradient, accepted, step.iterations, self._elapsed()
+            number, self.best.merit, damping, gain, size, gradient, accepted, step.iterations, self._elapsed()
         )
         if self._record(record):
             return accepted, Status.CALLBACK
         if size <= self.settings.step_tolerance * (reach + self.settings.step_tolerance):
             return accepted, Status.STEP_TOLERANCE if accepted else Status.STALLED
         if accepted:
-            return True, self._settled(before)
+            return True, self._settled(before, damping)
         return False, None if self.damping.reject() else Status.STALLED
 
     def _extrapolate(self, flat: Tensor, change: Tensor, gain: float) -> None:
@@ -151,17 +152,21 @@ class Iteration:
         """
         factor = min(1.0 / (2.0 - gain), _LONGEST_EXTRAPOLATION) if gain < 2.0 else _LONGEST_EXTRAPOLATION
         if factor > self.settings.least_extrapolation:
-            trial, value = self._evaluate(flat + factor * change)
-            if value < self.merit:
-                self.state, self.merit = trial, value
+            trial = self._trial(flat + factor * change)
+            if trial is not None and trial.merit < self.best.merit:
+                self.best = trial
 
-    def _settled(self, before: float) -> Status | None:
-        """Whether the merit has come to rest; tightens an iterative linear solver first."""
-        if self.merit == 0.0:
+    def _settled(self, before: float, damping: float) -> Status | None:
+        """Whether the merit has come to rest; tightens an iterative linear solver first.
+
+        Steps that heavy damping kept short say little, so more of them are waited for.
+        """
+        if self.best.merit == 0.0:
             return Status.ZERO_MERIT
         settings = self.settings
-        self.recent = [*self.recent, (before - self.merit) / before][-settings.patience :]
-        largest = max(self.recent) if len(self.recent) == settings.patience else math.inf
+        patience = settings.patience * (1 if damping <= settings.initial_damping else _PATIENCE_WHEN_DAMPED)
+        self.recent.append((before - self.best.merit) / before)
+        largest = max(self.recent[-patience:]) if len(self.recent) >= patience else math.inf
         loose = self.problem.solver.inexact and self.accuracy > _TIGHTEST_ACCURACY
         if loose and largest < max(self.accuracy, settings.merit_tolerance):
             self.accuracy *= 0.1
@@ -178,15 +183,15 @@ class Iteration:
         floored = diagonal.clamp_min(floor if 0.0 < floor < math.inf else 1.0)
         return torch.where(diagonal > 0.0, floored, torch.ones_like(diagonal))
 
-    def _evaluate(self, flat: Tensor) -> tuple[dict[str, Tensor], float]:
-        trial = self.problem.layout.unflatten(flat)
-        if self.guard is not None and not self.guard(self.state, trial):
-            return trial, math.inf
-        return trial, self._merit(trial)
+    def _trial(self, flat: Tensor) -> Evaluation | None:
+        """A state, unless the guard refuses it."""
+        state = self.problem.layout.unflatten(flat)
+        refused = self.guard is not None and not self.guard(self.best.state, state)
+        return None if refused else self._evaluate(state)
 
-    def _merit(self, state: State) -> float:
+    def _evaluate(self, state: State) -> Evaluation:
         with self._timed("merit"):
-            return merit(self.problem.terms, state)
+            return self.problem.structure.evaluate(state)
 
     @contextmanager
     def _timed(self, what: str) -> Iterator[None]:
@@ -200,7 +205,7 @@ class Iteration:
     def _record(self, record: IterationRecord) -> bool:
         """Keeps the record, with the observed quantities of the best state; True when the callback says stop."""
         if record.accepted and self.observe is not None:
-            self.quantities = self.observe(self.state)
+            self.quantities = self.observe(self.best.state)
         record.quantities.update(self.quantities)
         self.history.append(record)
         return bool(self.callback(record)) if self.callback is not None else False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -10,10 +11,12 @@ import scipy.sparse as sp
 import torch
 from torch import Tensor
 
+from .affine import AffinePart
+from .compiled import CompiledTerm
 from .layout import Layout
-from .sparse import scatter_matrix
+from .products import ProductSum
 
-TermPattern = tuple[Tensor, list[int], Tensor, bool]  # nodes (k, n), widths, unknowns (K, n), linear
+Ints = np.ndarray
 
 
 class NormalPattern:
@@ -21,154 +24,120 @@ class NormalPattern:
 
     The pattern is found between nodes (a few unknowns each), which is an order of magnitude cheaper than
     between unknowns; positions of single entries follow by arithmetic. Products of the Jacobian entries of
-    an element are summed into place by one fixed sparse matrix; terms that are linear are added once.
+    an element are summed into place by one fixed sparse matrix; linear terms are added as a constant.
 
     Attributes:
         offsets: (N+1,) start of each column.
         rows: (nnz,) row of each entry.
     """
 
-    def __init__(self, layout: Layout, terms: Sequence[TermPattern], dtype: torch.dtype) -> None:
-        self.num_unknowns = layout.num_unknowns
-        self._dtype = dtype
-        self._terms = terms
-        sizes = np.concatenate([np.full(n, d, np.int64) for n, d in layout.sizes.values()])
-        self._widths = sizes
-        self._first = np.concatenate([[0], np.cumsum(sizes)])
-        self._pair_nodes(terms)
+    def __init__(self, layout: Layout, terms: Sequence[CompiledTerm], affine: AffinePart | None, like: Tensor) -> None:
+        self.num_unknowns, self._like = layout.num_unknowns, like
+        self._widths = np.concatenate([np.full(n, d, np.int64) for n, d in layout.sizes.values()])
+        self._first = np.concatenate([[0], np.cumsum(self._widths)])
+        nodes = [term.nodes.cpu().numpy() for term in terms]
+        constant = sp.tril(affine.normal_matrix, format="coo") if affine is not None else None
+        self._pair_nodes(nodes, constant)
         self._place_columns()
-        self._scatter = self._build_scatter()
+        self._products: ProductSum | None = None
         self._constant: Tensor | None = None
+        if terms:
+            found = [self._product_places(n, t.widths) for n, t in zip(nodes, terms, strict=True)]
+            places, factors = zip(*found, strict=True)
+            firsts = [[0] * sum(term.widths) for term in terms]
+            self._products = ProductSum(firsts, places, factors, self.rows.size, like)
+        if affine is not None and constant is not None:
+            self._constant = self._place_constant(constant).to(like)
 
-    def _pair_nodes(self, terms: Sequence[TermPattern]) -> None:
+    def _pair_nodes(self, stencils: Sequence[Ints], constant: sp.coo_matrix | None) -> None:
+        """Sorted pairs ``column node <= row node`` of nodes that meet in an element, ``(n, n)`` included."""
         count = self._widths.size
-        pattern = sp.identity(count, dtype=np.int8, format="csr")
-        for nodes, _, _, _ in terms:
-            k, n = nodes.shape
-            rows = np.repeat(np.arange(n), k)
-            incidence = sp.csr_matrix((np.ones(k * n, np.int8), (rows, nodes.T.reshape(-1).cpu().numpy())), (n, count))
-            incidence.data[:] = 1
-            product = (incidence.T @ incidence).tocsr()
-            product.data[:] = 1
-            pattern = (pattern + product).tocsr()
-            pattern.data[:] = 1
-        lower = sp.tril(pattern, format="csc")
-        lower.sort_indices()
-        self._node_rows = lower.indices.astype(np.int64)
-        self._node_columns = np.repeat(np.arange(count), np.diff(lower.indptr)).astype(np.int64)
-        self._node_starts = lower.indptr.astype(np.int64)
-        self._keys = self._node_columns * count + self._node_rows
+        low, high = [np.arange(count)], [np.arange(count)]
+        for nodes in stencils:
+            for s in range(nodes.shape[0]):
+                low += [np.minimum(nodes[s], nodes[t]) for t in range(s)]
+                high += [np.maximum(nodes[s], nodes[t]) for t in range(s)]
+        if constant is not None:
+            owner = np.repeat(np.arange(count), self._widths)
+            low.append(owner[constant.col])
+            high.append(owner[constant.row])
+        columns, rows = np.concatenate(low), np.concatenate(high)
+        pairs = sp.csc_matrix((np.ones(rows.size, np.int8), (rows, columns)), (count, count))
+        pairs.sum_duplicates()
+        self._pair_rows = pairs.indices.astype(np.int64)
+        self._pair_columns = np.repeat(np.arange(count), np.diff(pairs.indptr))
+        self._pair_offsets = pairs.indptr
+        self._pair_keys = self._pair_columns * count + self._pair_rows
 
     def _place_columns(self) -> None:
-        """Positions of scalar entries from node pairs; see :meth:`_position`."""
-        widths, columns = self._widths, self._node_columns
-        row_widths = np.where(self._node_rows == columns, 0, widths[self._node_rows])
-        running = np.cumsum(row_widths)
-        before = running - row_widths
-        self._ahead = before - before[self._node_starts[:-1]][columns]  # unknowns of earlier off-diagonal rows
-        below = np.bincount(columns, row_widths, widths.size).astype(np.int64)  # unknowns under the diagonal block
-        entries = widths * (widths + 1) // 2 + widths * below
-        self._base = np.concatenate([[0], np.cumsum(entries)])
-        self._column_length = widths + below
-        self.rows = np.empty(self._base[-1], np.int64)
-        offsets = np.empty(self.num_unknowns + 1, np.int64)
-        offsets[-1] = self._base[-1]
-        pairs = np.arange(columns.size)
+        """Start and stride of every pair of nodes (see :func:`_place`), and the rows of all entries."""
+        widths, columns, rows = self._widths, self._pair_columns, self._pair_rows
+        row_widths = widths[rows]
+        below = np.bincount(columns, row_widths, widths.size).astype(np.int64)  # the diagonal block included
+        base = np.concatenate([[0], np.cumsum(widths * below - widths * (widths - 1) // 2)])
+        before = np.cumsum(row_widths) - row_widths
+        self._start = base[columns] + before - before[self._pair_offsets[:-1]][columns]
+        self._stride = (below - 1)[columns]
+        self.rows = np.empty(base[-1], np.int64)
+        self.offsets = np.empty(self.num_unknowns + 1, np.int64)
+        self.offsets[-1] = base[-1]
         for j in range(int(widths.max(initial=0))):
             nodes = np.flatnonzero(widths > j)
-            offsets[self._first[nodes] + j] = self._start(nodes, j)
+            self.offsets[self._first[nodes] + j] = base[nodes] + j * below[nodes] - (j * (j - 1)) // 2
             for i in range(int(widths.max())):
-                here = pairs[(widths[columns] > j) & (widths[self._node_rows] > i)]
-                here = here[(self._node_rows[here] != columns[here]) | (i >= j)]
-                self.rows[self._position(here, i, j)] = self._first[self._node_rows[here]] + i
-        self.offsets = offsets
+                pairs = np.flatnonzero((widths[columns] > j) & (row_widths > i) & ((rows != columns) | (i >= j)))
+                self.rows[_place(self._start[pairs], self._stride[pairs], i, j)] = self._first[rows[pairs]] + i
 
-    def _start(self, node: np.ndarray, j: np.ndarray | int) -> np.ndarray:
-        result: np.ndarray = self._base[node] + j * self._column_length[node] - (j * (j - 1)) // 2
-        return result
+    def _product_places(self, nodes: Ints, widths: list[int]) -> tuple[Tensor, Tensor | None]:
+        """Places ``(pairs, n)`` of the products of local unknowns p >= q, and their factors.
 
-    def _position(self, pair: np.ndarray, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
-        """Place of the entry (component i of the pair's row node, component j of its column node)."""
-        column = self._node_columns[pair]
-        start = self._start(column, j)
-        diagonal = self._node_rows[pair] == column
-        result: np.ndarray = np.where(diagonal, start + i - j, start + self._widths[column] - j + self._ahead[pair] + i)
-        return result
+        The factor is 2 where p and q are one unknown, which happens if an element names a node twice.
+        """
+        first = np.concatenate([[0], np.cumsum(widths)]).tolist()
+        places = np.empty((first[-1] * (first[-1] + 1) // 2, nodes.shape[1]), np.int64)
+        factors = None
+        for t, s in itertools.combinations_with_replacement(range(len(widths)), 2):
+            swapped, same = nodes[s] < nodes[t], nodes[s] == nodes[t]
+            pairs = self._find(np.maximum(nodes[s], nodes[t]), np.minimum(nodes[s], nodes[t]))
+            start, stride = self._start[pairs], self._stride[pairs]
+            repeated = s != t and bool(same.any())
+            for a, b in itertools.product(range(widths[s]), range(widths[t])):
+                p, q = first[s] + a, first[t] + b
+                if p < q:
+                    continue
+                place = _place(start, stride, a, b)
+                if s != t:
+                    place = np.where(swapped, _place(start, stride, b, a), place)
+                if repeated:
+                    place = np.where(same, _place(start, stride, max(a, b), min(a, b)), place)
+                    if a == b:
+                        factors = np.ones(places.shape) if factors is None else factors
+                        factors[p * (p + 1) // 2 + q] += same
+                places[p * (p + 1) // 2 + q] = place
+        return torch.from_numpy(places), None if factors is None else torch.from_numpy(factors)
 
-    def _build_scatter(self) -> Tensor | None:
-        """The fixed matrix that sums products of Jacobian entries of the non-linear terms."""
-        positions, factors = [], []
-        for nodes, widths, _, linear in self._terms:
-            if linear:
-                continue
-            place, factor = self._product_positions(nodes.cpu().numpy(), widths)
-            positions.append(place)
-            factors.append(factor)
-        if not positions:
-            return None
-        device = self._terms[0][2].device
-        index = torch.from_numpy(np.concatenate(positions)).to(device)
-        weights = torch.from_numpy(np.concatenate(factors)).to(device, self._dtype)
-        return scatter_matrix(index, int(self._base[-1]), self._dtype, weights)
+    def _find(self, rows: Ints, columns: Ints) -> Ints:
+        """Numbers of pairs of nodes ``rows >= columns``."""
+        found: Ints = np.searchsorted(self._pair_keys, columns * self._widths.size + rows)
+        return found
 
-    def _product_positions(self, nodes: np.ndarray, widths: list[int]) -> tuple[np.ndarray, np.ndarray]:
-        """Places of the products of local unknowns (p, q), p >= q, and 2 where both are one unknown."""
-        count = self._widths.size
-        owner = np.repeat(np.arange(len(widths)), widths)
-        component = np.concatenate([np.arange(w) for w in widths])
-        pair_of: dict[tuple[int, int], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
-        places, factors = [], []
-        for p in range(owner.size):
-            for q in range(p + 1):
-                s, t = int(owner[p]), int(owner[q])
-                if (s, t) not in pair_of:
-                    low, high = np.minimum(nodes[s], nodes[t]), np.maximum(nodes[s], nodes[t])
-                    pair = np.searchsorted(self._keys, low * count + high)
-                    pair_of[s, t] = (pair, nodes[s] < nodes[t], nodes[s] == nodes[t])
-                pair, swapped, same = pair_of[s, t]
-                a, b = component[p], component[q]
-                i = np.where(same, max(a, b), np.where(swapped, b, a))
-                j = np.where(same, min(a, b), np.where(swapped, a, b))
-                places.append(self._position(pair, i, j))
-                factors.append(np.where(same & (a == b) & (p != q), 2.0, 1.0))
-        return np.concatenate(places), np.concatenate(factors)
+    def _place_constant(self, lower: sp.coo_matrix) -> Tensor:
+        """(nnz,) the lower triangle of a constant matrix."""
+        owner = np.repeat(np.arange(self._widths.size), self._widths)
+        rows, columns = owner[lower.row], owner[lower.col]
+        pairs = self._find(rows, columns)
+        values = np.zeros(self.rows.size)
+        i, j = lower.row - self._first[rows], lower.col - self._first[columns]
+        values[_place(self._start[pairs], self._stride[pairs], i, j)] = lower.data
+        return torch.from_numpy(values)
 
     def assemble(self, jacobians: Sequence[Tensor]) -> Tensor:
-        """(nnz,) values of the lower triangle for element Jacobians ``(m, K, n)``."""
-        if self._constant is None:
-            self._constant = self._assemble_linear(jacobians)
-        if self._scatter is None:
-            return self._constant
-        products = []
-        for (_, _, _, linear), jacobian in zip(self._terms, jacobians, strict=True):
-            if not linear:
-                p, q = torch.tril_indices(jacobian.shape[1], jacobian.shape[1], device=jacobian.device)
-                total = jacobian[0][p] * jacobian[0][q]
-                for row in jacobian[1:]:
-                    total.addcmul_(row[p], row[q])
-                products.append(total.reshape(-1))
-        return self._constant + self._scatter @ torch.cat(products)
-
-    def _assemble_linear(self, jacobians: Sequence[Tensor]) -> Tensor:
-        total = np.zeros(self._base[-1])
-        keys = np.repeat(np.arange(self.num_unknowns), np.diff(self.offsets)) * self.num_unknowns + self.rows
-        for (_, _, unknowns, linear), jacobian in zip(self._terms, jacobians, strict=True):
-            if not linear:
-                continue
-            m, k, n = jacobian.shape
-            values = jacobian.permute(0, 2, 1).reshape(-1).cpu().numpy()
-            columns = unknowns.T.expand(m, -1, -1).reshape(-1).cpu().numpy()
-            rows = np.repeat(np.arange(m * n), k)
-            matrix = sp.csr_matrix((values, (rows, columns)), (m * n, self.num_unknowns))
-            product = sp.tril(matrix.T @ matrix, format="csc")
-            product.eliminate_zeros()
-            product_columns = np.repeat(np.arange(self.num_unknowns), np.diff(product.indptr)).astype(np.int64)
-            places = np.searchsorted(keys, product_columns * self.num_unknowns + product.indices)
-            np.add.at(total, places, product.data)
-        return torch.from_numpy(total).to(jacobians[0].device, self._dtype)
+        """(nnz,) values of the lower triangle for element Jacobians ``(m, K, n)`` of the terms."""
+        values = self._like.new_zeros(self.rows.size) if self._products is None else self._products(jacobians)
+        return values if self._constant is None else values.add_(self._constant)
 
     @cached_property
-    def full(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def full(self) -> tuple[Ints, Ints, Ints]:
         """Column offsets, rows and source positions of the full symmetric matrix in compressed columns."""
         numbers = np.arange(1, self.rows.size + 1)
         lower = sp.csc_matrix((numbers, self.rows, self.offsets), (self.num_unknowns, self.num_unknowns))
@@ -176,3 +145,12 @@ class NormalPattern:
         both = (lower + upper).tocsc()
         both.sort_indices()
         return both.indptr, both.indices, both.data - 1
+
+
+def _place(start: Ints, stride: Ints, i: Ints | int, j: Ints | int) -> Ints:
+    """Place of the entry (component i of the row node, component j of the column node) of pairs of nodes.
+
+    Column j of a node holds one entry less than column j - 1.
+    """
+    result: Ints = start + j * stride + (i - (j * (j - 1)) // 2)
+    return result

@@ -17,15 +17,21 @@ def csr_matrix(offsets: Tensor, columns: Tensor, values: Tensor, shape: tuple[in
         )
 
 
+def group(index: Tensor, size: int) -> tuple[Tensor, Tensor]:
+    """Positions of equal ``index`` in 0..size-1 side by side: 32-bit offsets (size+1,) and order, stable."""
+    order = torch.argsort(index.to(torch.int32), stable=True)
+    counts = torch.bincount(index, minlength=size)
+    offsets = torch.zeros(size + 1, dtype=torch.int64, device=index.device)
+    torch.cumsum(counts, 0, out=offsets[1:])
+    return offsets.to(torch.int32), order.to(torch.int32)
+
+
 def scatter_matrix(index: Tensor, size: int, dtype: torch.dtype, weights: Tensor | None = None) -> Tensor:
     """CSR matrix ``S`` with ``(S @ x)[i] = sum of weights[p] x[p] over all p with index[p] = i``.
 
     A fixed matrix product sums repeated indices several times faster than ``index_add`` does, and always in
     the same order.
     """
-    order = torch.argsort(index, stable=True)
-    counts = torch.bincount(index, minlength=size)
-    offsets = torch.zeros(size + 1, dtype=torch.int64, device=index.device)
-    torch.cumsum(counts, 0, out=offsets[1:])
+    offsets, order = group(index, size)
     values = torch.ones(index.shape[0], dtype=dtype, device=index.device) if weights is None else weights[order]
     return csr_matrix(offsets, order, values, (size, index.shape[0]))

@@ -114,9 +114,15 @@ class ElementTerm:
     def derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
         """Residuals ``(n, m)`` and Jacobians ``(n, m, K)``, K unknowns of the stencil in order."""
         if self.jacobian is not None:
-            closed = torch.func.vmap(self.jacobian)(*arguments)
-            return self.values(arguments), closed if closed.ndim == 3 else closed[:, None]
+            return self.values(arguments), self.jacobians(arguments)
         return differentiate(self.residual, arguments, len(self.stencil))
+
+    def jacobians(self, arguments: tuple[Tensor, ...]) -> Tensor:
+        """Jacobians ``(n, m, K)``."""
+        if self.jacobian is None:
+            return differentiate(self.residual, arguments, len(self.stencil))[1]
+        closed = torch.func.vmap(self.jacobian)(*arguments)
+        return closed if closed.ndim == 3 else closed[:, None]
 
 
 def as_rows(values: Tensor) -> Tensor:

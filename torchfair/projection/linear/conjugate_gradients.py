@@ -32,39 +32,35 @@ class ConjugateGradients:
     def solve(self, system: LinearSystem, damping: Tensor, accuracy: float) -> Step:
         """One damped step; see the protocol."""
         jacobian, transpose = system.jacobian, system.jacobian_transpose
-        inverse = _inverse_blocks(system, damping)
+        inverse = preconditioner(system, damping)
         remainder = -system.gradient
         target = max(accuracy, self.tightest) * float(remainder.norm())
         change = torch.zeros_like(remainder)
-        direction = _apply(system, inverse, remainder)
+        direction = inverse @ remainder
         energy = float(remainder @ direction)
         if not energy >= 0.0:
             raise SingularSystemError("the preconditioner is not positive definite or not finite")
         iterations = 0
         while float(remainder.norm()) > target and iterations < self.max_iterations:
-            image = transpose @ (jacobian @ direction) + damping * direction
+            image = (transpose @ (jacobian @ direction)).addcmul_(damping, direction)
             curvature = float(direction @ image)
             if not curvature > 0.0:
                 raise SingularSystemError("the normal matrix is singular, indefinite or not finite")
             length = energy / curvature
             change.add_(direction, alpha=length)
             remainder.sub_(image, alpha=length)
-            preconditioned = _apply(system, inverse, remainder)
+            preconditioned = inverse @ remainder
             previous, energy = energy, float(remainder @ preconditioned)
             direction = preconditioned.add_(direction, alpha=energy / previous)
             iterations += 1
         return Step(change, remainder, iterations)
 
 
-def _inverse_blocks(system: LinearSystem, damping: Tensor) -> dict[str, Tensor]:
-    """Inverses ``(n, d, d)`` of the damped diagonal blocks."""
+def preconditioner(system: LinearSystem, damping: Tensor) -> Tensor:
+    """Inverse of the damped diagonal blocks, as a CSR matrix."""
     parts = system.structure.layout.unflatten(damping)
-    return {name: invert(block + torch.diag_embed(parts[name])) for name, block in system.diagonal_blocks.items()}
-
-
-def _apply(system: LinearSystem, inverse: dict[str, Tensor], vector: Tensor) -> Tensor:
-    parts = system.structure.layout.unflatten(vector)
-    return torch.cat([torch.einsum("nij,nj->ni", inverse[name], part).reshape(-1) for name, part in parts.items()])
+    inverses = [invert(block + torch.diag_embed(parts[name])) for name, block in system.diagonal_blocks.items()]
+    return system.structure.block_diagonal.matrix(torch.cat([inverse.reshape(-1) for inverse in inverses]))
 
 
 def invert(blocks: Tensor) -> Tensor:

@@ -1,0 +1,95 @@
+"""All linear terms of a problem as one constant sparse system."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+import torch
+from torch import Tensor
+
+from .compiled import CompiledTerm
+from .layout import Layout, State
+from .sparse import csr_matrix
+
+_TOLERANCE = 1e-3
+
+
+class AffinePart:
+    """The linear terms: residuals ``A x + b`` of the flat vector x, scaled by the roots of their weights.
+
+    Zeros of the element Jacobians are dropped, for example between different coordinates of umbrella vectors.
+
+    Args:
+        terms: Linear terms, at least one.
+        layout: Blocks of variables.
+        free: (N,) unknowns that may move.
+        dtype: Of the blocks.
+
+    Attributes:
+        offset: (rows,) b.
+        jacobian: ``A`` with zero columns at fixed unknowns, a SciPy CSR matrix.
+    """
+
+    def __init__(self, terms: Sequence[CompiledTerm], layout: Layout, free: Tensor, dtype: torch.dtype) -> None:
+        origin = layout.unflatten(torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device))
+        self._terms = [compiled.term for compiled in terms]
+        matrices, offsets = [], []
+        for compiled in terms:
+            values, jacobians = compiled.term.derivatives(compiled.term.arguments(origin))
+            root = compiled.term.scaled_weights(values.square().sum(1)).sqrt()
+            n, m, k = jacobians.shape
+            entries = (jacobians * root[:, None, None]).cpu().numpy()
+            columns = np.repeat(compiled.unknowns.T.cpu().numpy()[:, None], m, axis=1)
+            rows = np.repeat(np.arange(n * m), k)
+            matrices.append(sp.csr_matrix((entries.ravel(), (rows, columns.ravel())), (n * m, layout.num_unknowns)))
+            offsets.append((values * root[:, None]).reshape(-1))
+        whole = sp.csr_matrix(sp.vstack(matrices))
+        whole.eliminate_zeros()
+        self.offset = torch.cat(offsets)
+        self._sizes = [offset.shape[0] for offset in offsets]
+        self._matrix, self._whole = whole, self._to_torch(whole)
+        self.jacobian = whole
+        if not bool(free.all()):
+            self.jacobian = whole.copy()
+            self.jacobian.data *= free.cpu().numpy()[whole.indices]
+            self.jacobian.eliminate_zeros()
+        self._transpose = self._to_torch(sp.csr_matrix(self.jacobian.T))
+
+    def _to_torch(self, matrix: sp.csr_matrix) -> Tensor:
+        offsets, columns = torch.from_numpy(matrix.indptr), torch.from_numpy(matrix.indices)
+        return csr_matrix(offsets, columns, torch.from_numpy(matrix.data), matrix.shape).to(self.offset.device)
+
+    def residual(self, flat: Tensor) -> Tensor:
+        """(rows,) scaled residuals; half the sum of their squares is the merit of the linear terms."""
+        result: Tensor = (self._whole @ flat).add_(self.offset)
+        return result
+
+    def misfit(self, state: State, flat: Tensor) -> str | None:
+        """Name of a term whose residuals at a state are not those of the linear map: it is not linear."""
+        sizes = abs(self._matrix) @ flat.abs().cpu().numpy() + self.offset.abs().cpu().numpy()
+        scales = torch.split(torch.from_numpy(sizes), self._sizes)
+        for term, mine, scale in zip(self._terms, torch.split(self.residual(flat), self._sizes), scales, strict=True):
+            values = term.values(term.arguments(state))
+            own = (values * term.scaled_weights(values.square().sum(1)).sqrt()[:, None]).reshape(-1)
+            if own.numel() and not float((own - mine).abs().max()) <= _TOLERANCE * float(scale.max()):
+                return term.name
+        return None
+
+    def gradient(self, residual: Tensor) -> Tensor:
+        """``A^T r``, zero at fixed unknowns."""
+        result: Tensor = self._transpose @ residual
+        return result
+
+    @cached_property
+    def normal_matrix(self) -> sp.csr_matrix:
+        """``A^T A``, zero at fixed unknowns."""
+        return sp.csr_matrix(self.jacobian.T @ self.jacobian)
+
+    @cached_property
+    def diagonal(self) -> Tensor:
+        """(N,) of ``A^T A``."""
+        squares = self.jacobian.multiply(self.jacobian).sum(axis=0)
+        return torch.from_numpy(np.asarray(squares).reshape(-1)).to(self.offset)
