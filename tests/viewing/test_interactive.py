@@ -13,6 +13,7 @@ from torchfair.viewing.interactive import register_meshes
 def test_meshes_and_their_edges_are_registered() -> None:
     import polyscope
 
+    polyscope.set_use_prefs_file(False)
     polyscope.init("openGL_mock")
     vertices, topology = wavy_grid()
     register_meshes({"before": vertices, "after": 2 * vertices}, topology)

@@ -12,6 +12,7 @@ from .. import constraints as c
 from ..boundary import boundary_corners, boundary_pieces
 from ..constraints.closeness import TangentPlanes
 from ..constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
+from ..energies import normal_variation
 from ..errors import MeshError
 from ..geometry import corner_angles, degenerate_faces, face_areas, face_normals
 from ..geometry.closest_curve_point import ReferenceCurves
@@ -53,6 +54,7 @@ class FairProblem:
         self._refuse_degenerate_faces()
         self.reference = ReferenceSurface(*(reference or (vertices, topology)))
         self._planes = TangentPlanes(self.reference)
+        self._other_goals = bool(targets) or reference is not None
         self.handles = torch.tensor(list(targets), dtype=torch.int64)
         self.targets = torch.stack(list(targets.values())) if targets else torch.zeros(0, 3, dtype=vertices.dtype)
         self.design_mode = self._leaves_reference()
@@ -81,6 +83,7 @@ class FairProblem:
         if warped.numel() and float(warped.max()) > _LARGEST_WARP:
             steps = max(steps, _PLANARITY_STAGES)
         steps = min(steps, _MOST_STAGES)
+        self._other_goals = self._other_goals or steps > 1
         return [(i + 1) / steps for i in range(steps)]
 
     def terms(self, share: float) -> list[ElementTerm]:
@@ -222,7 +225,20 @@ class FairProblem:
             ),
         ]
 
-    # ---- guard -----------------------------------------------------------------------------------------
+    # ---- guards ----------------------------------------------------------------------------------------
+
+    def admits(self, state: State, trial: State) -> bool:
+        """Whether a step may be taken: no face turns over, and E does not rise above that of the start.
+
+        E may rise where handles, another reference or planarity ask for a different shape.
+        """
+        if not self.keeps_faces(state, trial):
+            return False
+        return self._other_goals or float(normal_variation(trial["vertices"], self.topology)) <= self._start_energy
+
+    @cached_property
+    def _start_energy(self) -> float:
+        return float(normal_variation(self.vertices, self.topology))
 
     @cached_property
     def _normals(self) -> Tensor:

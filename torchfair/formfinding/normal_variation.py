@@ -59,7 +59,8 @@ def minimise_normal_variation(
     """Moves vertices along a reference surface so that E = sum l l* becomes small.
 
     Works on triangle, quad and hybrid polygon meshes, with or without boundary. Guarantees at every step:
-    the merit never increases; no vertex goes farther from the reference surface than
+    the merit never increases, nor does E above its start (unless handles, another reference or planarity
+    ask for a different shape); no vertex goes farther from the reference surface than
     ``settings.distance_limit``; no corner angle and no face area falls below its bound; no face flips. The
     problem is solved centred and with unit mean edge length, so results do not depend on the unit.
 
@@ -109,7 +110,7 @@ def minimise_normal_variation(
             settings=settings.stage() if share < 1.0 else settings.projection,
             callback=callback,
             observe=observe,
-            guard=problem.keeps_faces,
+            guard=problem.admits,
         )
         runs.append(run)
         if run.status in (Status.INTERRUPTED, Status.CALLBACK):

@@ -50,5 +50,6 @@ def show_meshes(meshes: Mapping[str, Tensor], topology: Topology) -> None:
     if importlib.util.find_spec("polyscope") is not None:
         import polyscope
 
+        polyscope.set_use_prefs_file(False)  # leaves no file behind
         polyscope.init()
     register_meshes(meshes, topology).show()
