@@ -1,0 +1,30 @@
+"""Analytic surfaces with exact normals, curvatures and C, and meshes on them, principal and not."""
+
+from .catalogue import EXAMPLES as EXAMPLES
+from .catalogue import SURFACES as SURFACES
+from .catalogue import builtin_mesh as builtin_mesh
+from .height_fields import FreeFormPatch as FreeFormPatch
+from .height_fields import Paraboloid as Paraboloid
+from .height_fields import PrincipalParaboloid as PrincipalParaboloid
+from .irregular import icosphere as icosphere
+from .irregular import irregular_triangles as irregular_triangles
+from .minimal import Enneper as Enneper
+from .minimal import Helicoid as Helicoid
+from .minimal import PrincipalHelicoid as PrincipalHelicoid
+from .principal_quads import interior_absolute_curvature as interior_absolute_curvature
+from .principal_quads import parameter_quads as parameter_quads
+from .principal_quads import principal_quads as principal_quads
+from .principal_triangles import parameter_triangles as parameter_triangles
+from .principal_triangles import principal_triangles as principal_triangles
+from .revolution import Catenoid as Catenoid
+from .revolution import Cone as Cone
+from .revolution import Cylinder as Cylinder
+from .revolution import Hyperboloid as Hyperboloid
+from .revolution import Torus as Torus
+from .roofs import Canopy as Canopy
+from .roofs import example_roof as example_roof
+from .roofs import hybrid_roof as hybrid_roof
+from .rotated_lattice import rotated_lattice as rotated_lattice
+from .shape_mesh import ShapeMesh as ShapeMesh
+from .sphere import Sphere as Sphere
+from .surface import Surface as Surface

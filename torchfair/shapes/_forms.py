@@ -1,0 +1,130 @@
+"""Exact derivatives of a parametrisation and the shape operator they give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, cast
+
+import torch
+from torch import Tensor
+from torch.func import jvp
+
+Map = Callable[[Tensor, Tensor], Tensor]
+
+
+class ShapeOperator(NamedTuple):
+    """Symmetric 2 x 2 matrix ``[[uu, uv], [uv, vv]]`` in the orthonormal frame that starts along the u-line."""
+
+    uu: Tensor
+    uv: Tensor
+    vv: Tensor
+
+
+def tangents(position: Map, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor]:
+    """Partial derivatives ``x_u, x_v`` ``(..., 3)``.
+
+    ``position`` treats every parameter pair on its own, so one forward-mode product with a tensor of ones
+    differentiates all points at once. Stacked copies of the points take one direction each.
+    """
+    one, zero = torch.ones_like(u), torch.zeros_like(u)
+    points = (torch.stack([u, u]), torch.stack([v, v]))
+    x_u, x_v = cast(Tensor, jvp(position, points, (torch.stack([one, zero]), torch.stack([zero, one])))[1])
+    return x_u, x_v
+
+
+class Partials(NamedTuple):
+    """First and second partial derivatives of a parametrisation, each ``(..., 3)``."""
+
+    u: Tensor
+    v: Tensor
+    uu: Tensor
+    uv: Tensor
+    vv: Tensor
+
+
+def partials(position: Map, u: Tensor, v: Tensor) -> Partials:
+    """All partial derivatives up to order two, from the first and second ones along u, v and their diagonal."""
+    one, zero = torch.ones_like(u), torch.zeros_like(u)
+    points = (torch.stack([u, u, u]), torch.stack([v, v, v]))
+    directions = (torch.stack([one, zero, one]), torch.stack([zero, one, one]))
+
+    def along(u: Tensor, v: Tensor) -> Tensor:
+        return cast(Tensor, jvp(position, (u, v), directions)[1])
+
+    first, second = cast("tuple[Tensor, Tensor]", jvp(along, points, directions))
+    x_uu, x_vv, diagonal = second
+    return Partials(first[0], first[1], x_uu, 0.5 * (diagonal - x_uu - x_vv), x_vv)
+
+
+def fundamental_forms(x: Partials) -> tuple[Tensor, Tensor]:
+    """First and second fundamental form ``(..., 3)``, each ``(11, 12, 22)``; the second positive where convex."""
+    normal = unit(torch.linalg.cross(x.u, x.v))
+    first = torch.stack([dot(x.u, x.u), dot(x.u, x.v), dot(x.v, x.v)], dim=-1)
+    return first, -torch.stack([dot(normal, x.uu), dot(normal, x.uv), dot(normal, x.vv)], dim=-1)
+
+
+def dot(a: Tensor, b: Tensor) -> Tensor:
+    """Scalar product over the last axis."""
+    return (a * b).sum(-1)
+
+
+def unit(vectors: Tensor) -> Tensor:
+    """Vectors divided by their length, which must not be zero."""
+    length: Tensor = torch.linalg.vector_norm(vectors, dim=-1, keepdim=True)
+    return vectors / length
+
+
+def shape_operator(first: Tensor, second: Tensor) -> ShapeOperator:
+    """Shape operator in an orthonormal frame from both fundamental forms ``(..., 3)``, each ``(11, 12, 22)``.
+
+    The frame is ``x_u / |x_u|`` and the tangent vector 90 degrees to its left (Gram-Schmidt on x_u, x_v).
+    """
+    e, f, g = first.unbind(-1)
+    a, b, c = second.unbind(-1)
+    slant = f / e
+    height = g - f * slant  # squared length of x_v less its part along x_u
+    return ShapeOperator(
+        uu=a / e,
+        uv=(b - slant * a) / (e * height).sqrt(),
+        vv=(c - 2 * slant * b + slant**2 * a) / height,
+    )
+
+
+def area_element(first: Tensor) -> Tensor:
+    """Area per unit of parameter area, from the first fundamental form."""
+    e, f, g = first.unbind(-1)
+    return (e * g - f**2).sqrt()
+
+
+def eigenvalues(s: ShapeOperator) -> Tensor:
+    """Both eigenvalues ``(..., 2)``, the larger first. The derivative at equal eigenvalues is that of their mean."""
+    mean, difference = 0.5 * (s.uu + s.vv), 0.5 * (s.uu - s.vv)
+    radius = torch.linalg.vector_norm(torch.stack([difference, s.uv], dim=-1), dim=-1)
+    return torch.stack([mean + radius, mean - radius], dim=-1)
+
+
+# The angle of a line field needs a cut somewhere. Parameter lines and diagonals are where fields are usually aligned,
+# so the cut stays away from them: rounding errors do not flip directions there.
+_CUT = 0.9
+
+
+def eigen_angle(s: ShapeOperator) -> Tensor:
+    """Angle ``(...)`` in radians from the first frame vector to the eigenvector of the larger eigenvalue.
+
+    Zero, with zero derivative, where the eigenvalues agree up to rounding.
+    """
+    difference = 0.5 * (s.uu - s.vv)
+    size = torch.maximum(torch.maximum(s.uu.abs(), s.vv.abs()), s.uv.abs())
+    radius = torch.linalg.vector_norm(torch.stack([difference, s.uv], dim=-1), dim=-1)
+    umbilic = (radius <= 64 * torch.finfo(size.dtype).eps * size).detach()
+    x = torch.where(umbilic, torch.ones_like(radius), difference)
+    y = torch.where(umbilic, torch.zeros_like(radius), s.uv)
+    cos, sin = torch.cos(torch.full_like(x, _CUT)), torch.sin(torch.full_like(x, _CUT))
+    doubled = torch.atan2(cos * y - sin * x, cos * x + sin * y) + _CUT
+    return torch.where(umbilic, torch.zeros_like(radius), 0.5 * doubled)
+
+
+def broadcast(u: Tensor, v: Tensor) -> tuple[Tensor, Tensor]:
+    """Both parameters in one shape, contiguous."""
+    shape = (u + v).shape
+    return u.expand(shape).contiguous(), v.expand(shape).contiguous()
