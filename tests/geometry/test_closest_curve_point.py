@@ -128,6 +128,16 @@ def test_rigid_motions_and_scaling():
         assert torch.equal(scaled.segments, found.segments)
 
 
+def test_far_from_the_origin_no_digit_is_lost():
+    """Coordinates of 25 binary digits are exact before and after the shift, and so are all differences."""
+    generator = torch.Generator().manual_seed(0)
+    points, curve = (torch.randint(2**25, (n, 3), generator=generator).double() * 2.0**-30 for n in (300, 40))
+    near = ReferenceCurve(curve, closed=True).closest(points)
+    far = ReferenceCurve(curve + 2.0**20, closed=True).closest(points + 2.0**20)
+    assert torch.equal(near.distances, far.distances)
+    assert torch.equal(near.segments, far.segments)
+
+
 def test_a_polygon_inscribed_in_a_circle():
     """The circle is at most 1 - cos(pi / n) away, above the middles of the sides."""
     count = 30

@@ -8,7 +8,7 @@ import numpy as np
 
 from ._closest_boxes import BoxTree, Floats, Ints
 
-_SAFETY = 1e-12  # rounding of a distance, relative to the lengths involved, and far more
+_SAFETY = 5e-14  # rounding of a distance, relative to the lengths involved, several times over
 BLOCK = 4096  # points searched together: the work arrays stay in the cache
 PAIRS = 1 << 20  # pairs of a point and a box held at once
 _MEASURED = 1 << 14  # pairs measured together

@@ -48,9 +48,10 @@ class Segments:
     def locate(self, points: Floats, pieces: Ints) -> tuple[Floats, Floats, Floats]:
         """Squared distances (M,), nearest positions (3, M) and where on the segment, from 0 to 1 (M,)."""
         starts, ends, edges = (x.take(pieces, axis=1) for x in (self._starts, self._ends, self._edges))
+        offset = points - starts
         # Divided, not multiplied by a reciprocal: then the end of the segment is at 1 exactly.
-        fractions = (dot(points - starts, edges) / self._squared.take(pieces)).clip(0.0, 1.0)
-        # Start + edge may miss the end by rounding.
-        positions = np.where(fractions < 1.0, starts + fractions * edges, ends)
-        offset = points - positions
+        fractions = (dot(offset, edges) / self._squared.take(pieces)).clip(0.0, 1.0)
+        steps = fractions * edges
+        positions = np.where(fractions < 1.0, starts + steps, ends)  # start + edge may miss the end by rounding
+        offset -= steps
         return dot(offset, offset), positions, fractions

@@ -8,6 +8,7 @@ from ._closest_boxes import Floats, Ints
 from ._closest_search import BLOCK, PAIRS, PARTS, Shape, lowest_piece, margin, measure
 
 _CANDIDATES = 16  # pieces kept per point
+_SERVES = 2  # steps like the last one for which candidates should serve
 _SKIN = 0.2  # how far beyond the nearest piece candidates are gathered, in extents of a piece
 
 
@@ -19,20 +20,22 @@ class PieceTracker:
     nearest piece of all if it is nearer than that; if not, the point is searched again and gets a new
     anchor. Of the candidates only those are measured whose distance from the anchor was at most the
     distance to the last piece + m.
+
+    Gathering candidates costs as much as two searches. So it is left, for a point, until its last step was
+    short enough for them to serve several times; before that ``radius`` is the distance to the nearest piece.
     """
 
     def __init__(self, shape: Shape) -> None:
         self._shape = shape
         self._skin = _SKIN * np.minimum(shape.extents, shape.extents.mean())
-        self._anchors: Floats = np.zeros((0, 0))
+        self._previous: Floats = np.zeros((0, 0))
 
     def nearest(self, points: Floats) -> Ints:
         """The same as :func:`nearest_pieces` for the points (d, N), faster if they are near the last ones."""
-        if points.shape != self._anchors.shape:
+        if points.shape != self._previous.shape:
             self._reset(points)
             return self._last.copy()
-        step = points - self._anchors
-        moved = np.sqrt((step * step).sum(0))
+        moved = _lengths(points - self._anchors)
         bound = np.sqrt(self._shape.squared_distances(points, self._last)) + moved
         bound += margin(self._shape, bound)
         known = bound < self._radius
@@ -42,31 +45,36 @@ class PieceTracker:
             self._last[known] = lowest_piece(row, piece, measure(self._shape, points, row, piece))
         lost = np.flatnonzero(~known)
         if lost.size:
-            self._search(lost, points)
+            skin = self._skin[self._last[lost]]
+            step = _lengths(points[:, lost] - self._previous[:, lost])
+            self._search(lost, points, np.where(_SERVES * step < skin, skin, 0.0))
+        self._previous = points.copy()
         return self._last.copy()
 
     def _reset(self, points: Floats) -> None:
         count = points.shape[1]
+        self._previous = points.copy()
         self._anchors = points.copy()
         self._radius = np.zeros(count)
         self._candidates = np.zeros((count, _CANDIDATES), np.int64)
         self._distances = np.full((count, _CANDIDATES), np.inf)
         self._last = self._shape.guess(points)
-        self._search(np.arange(count), points)
+        self._search(np.arange(count), points, np.zeros(count))
 
-    def _search(self, rows: Ints, points: Floats) -> None:
+    def _search(self, rows: Ints, points: Floats, skin: Floats) -> None:
+        """Searches some rows of all the points (d, N) anew; ``skin`` has one entry for each of them."""
         for first in range(0, rows.size, BLOCK):
-            block = rows[first : first + BLOCK]
-            self._anchor(block, points[:, block], self._last[block])
+            block = slice(first, first + BLOCK)
+            self._anchor(rows[block], points[:, rows[block]], skin[block])
 
-    def _anchor(self, rows: Ints, points: Floats, guess: Ints) -> None:
-        """Searches the points (d, n) with these row numbers, given a piece near each."""
-        reach = np.sqrt(self._shape.squared_distances(points, guess))
-        reach += margin(self._shape, reach) + self._skin[guess]
+    def _anchor(self, rows: Ints, points: Floats, skin: Floats) -> None:
+        """Makes the points (d, n) the anchors of ``rows``, with all pieces up to ``skin`` beyond the last one."""
+        reach = np.sqrt(self._shape.squared_distances(points, self._last[rows]))
+        reach += margin(self._shape, reach) + skin
         pairs = self._shape.tree.pairs(points, reach, PAIRS)
         if pairs is None:
             for part in np.array_split(np.arange(rows.size), min(PARTS, rows.size)):
-                self._anchor(rows[part], points[:, part], guess[part])
+                self._anchor(rows[part], points[:, part], skin[part])
             return
         point, piece = pairs
         squared = measure(self._shape, points, point, piece)
@@ -89,3 +97,9 @@ class PieceTracker:
         self._radius[rows] = reach
         full = np.flatnonzero(count > _CANDIDATES)
         self._radius[rows[full]] = distance[start[full] + _CANDIDATES]
+
+
+def _lengths(vectors: Floats) -> Floats:
+    """Euclidean lengths (N,) of vectors (d, N)."""
+    squared: Floats = (vectors * vectors).sum(0)
+    return np.sqrt(squared)

@@ -116,6 +116,8 @@ class ReferenceSurface:
         """Closest points of ``points`` (N, 3), N >= 0, anywhere in space.
 
         For points that are asked for again and again while they move, as in a solver, use :meth:`tracker`.
+        The search is slow only where very many pieces are equally near to within rounding: at the centre of
+        a sphere, or more than 1e5 times the size of a flat mesh away.
 
         Raises:
             ShapeError: if ``points`` is not a floating tensor (N, 3).
@@ -146,10 +148,10 @@ class ReferenceSurface:
 class ClosestPointTracker:
     """Closest points on a surface for the same N points again and again, while they move.
 
-    The result of :meth:`closest` is that of :meth:`ReferenceSurface.closest`, bit for bit, at about a tenth
-    of the time as long as points stay within about a quarter of an edge length of where they were first seen.
-    Points that went farther are searched anew. Keeps 16 candidates per point; another number of points, or
-    points in another order, cost one full search.
+    The result of :meth:`closest` is that of :meth:`ReferenceSurface.closest`, bit for bit, in about a quarter
+    of the time once the points move slowly: for every point up to 16 pieces around it are kept. A point that
+    moves by more than about a tenth of an edge length off the surface, or a fifth along it, is searched
+    anew, and only that point. Another number of points is a new start.
 
     Args:
         surface: where closest points are sought.
