@@ -121,7 +121,7 @@ class Topology:
 
     @property
     def num_interior_edges(self) -> int:
-        """I: edges with a face on either side; they carry the numbers 0..I-1."""
+        """I, edges with a face on either side; they carry the numbers 0..I-1."""
         return self.interior_edge_faces.shape[0]
 
     @property
@@ -198,7 +198,7 @@ class Topology:
 
     @cached_property
     def faces_by_size(self) -> dict[int, tuple[Tensor, Tensor]]:
-        """Faces grouped by number of corners: ``{k: (face numbers (n,), corners (n, k))}``."""
+        """Faces grouped by number of corners, ``{k: (face numbers (n,), corners (n, k))}``."""
         groups: dict[int, tuple[Tensor, Tensor]] = {}
         for size in torch.unique(self.face_sizes).tolist():
             numbers = torch.nonzero(self.face_sizes == size).squeeze(1)
@@ -227,7 +227,7 @@ class Topology:
 
     @cached_property
     def rings_by_valence(self) -> dict[int, tuple[Tensor, Tensor]]:
-        """Interior vertices grouped by valence: ``{k: (vertices (n,), ring (n, k))}``, rings counterclockwise."""
+        """Interior vertices grouped by valence, ``{k: (vertices (n,), ring (n, k))}``, rings counterclockwise."""
         interior = ~self.is_boundary_vertex & (self.valences > 0)
         groups: dict[int, tuple[Tensor, Tensor]] = {}
         for valence in torch.unique(self.valences[interior]).tolist():

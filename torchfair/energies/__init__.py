@@ -8,6 +8,7 @@ from .base import MeshModule as MeshModule
 from .normal_variation import NormalVariation as NormalVariation
 from .normal_variation import normal_variation as normal_variation
 from .normal_variation import normal_variation_per_edge as normal_variation_per_edge
+from .normal_variation_derivative import normal_variation_derivative as normal_variation_derivative
 from .polyline_fairness import PolylineFairness as PolylineFairness
 from .polyline_fairness import polyline_fairness as polyline_fairness
 from .polyline_fairness import polyline_fairness_per_triple as polyline_fairness_per_triple

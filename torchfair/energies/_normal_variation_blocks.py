@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from ..topology import Topology
+from ._normal_variation_memory import Scratch
 
-FACES_PER_BLOCK = 65536
-"""Faces handled at once on a CPU: few enough to stay in its cache, enough to keep its threads busy."""
+FACES_PER_THREAD = 65536
+"""Faces that each thread of a CPU handles at once: few enough for its cache, enough to be worth waking it."""
 
-_CACHE = "_normal_variation_blocks"
+_CACHE = "_normal_variation_tables"
 
 
 @dataclass(frozen=True)
 class Block:
-    """Up to :data:`FACES_PER_BLOCK` faces with k corners each.
+    """Up to :func:`faces_per_block` faces with k corners each.
 
     *Places* number the faces as the blocks hold them: sorted by number of corners. Index tables are
     ``(k * n,)``: first the first corner of all n faces, then the second, and so on. Side j of a face runs
@@ -43,12 +45,12 @@ class Block:
 
     @property
     def face_count(self) -> int:
-        """n."""
+        """Number n of faces."""
         return self.stop - self.start
 
     @property
     def side_count(self) -> int:
-        """k * n."""
+        """Number k * n of sides."""
         return self.corners.shape[0]
 
     def take(self, values: Tensor) -> Tensor:
@@ -56,17 +58,49 @@ class Block:
         return values[..., self.start : self.stop]
 
 
-def blocks_of(topology: Topology) -> tuple[Block, ...]:
-    """The blocks of a topology, remembered by it."""
-    blocks: tuple[Block, ...] | None = topology.__dict__.get(_CACHE)
-    if blocks is None:
+def faces_per_block(on_cpu: bool) -> int:
+    """Faces to handle at once; all of them on other devices."""
+    return FACES_PER_THREAD * torch.get_num_threads() if on_cpu else sys.maxsize
+
+
+@dataclass(frozen=True)
+class Tables:
+    """What the evaluation needs of a topology.
+
+    Attributes:
+        blocks: the faces.
+        face_count: F.
+        most_faces: faces of the largest block.
+        most_sides: sides of the block with most.
+        scratch: memory to work in.
+    """
+
+    blocks: tuple[Block, ...]
+    face_count: int
+    most_faces: int
+    most_sides: int
+    scratch: Scratch
+
+
+def tables_of(topology: Topology) -> Tables:
+    """The tables of a topology, remembered by it."""
+    tables: Tables | None = topology.__dict__.get(_CACHE)
+    if tables is None:
+        blocks = _build(topology)
+        tables = Tables(
+            blocks=blocks,
+            face_count=topology.num_faces,
+            most_faces=max((block.face_count for block in blocks), default=0),
+            most_sides=max((block.side_count for block in blocks), default=0),
+            scratch=Scratch(),
+        )
         # The same place where functools.cached_property keeps its values.
-        blocks = topology.__dict__[_CACHE] = _build(topology)
-    return blocks
+        topology.__dict__[_CACHE] = tables
+    return tables
 
 
 def _build(topology: Topology) -> tuple[Block, ...]:
-    limit = FACES_PER_BLOCK if topology.corners.is_cpu else max(topology.num_faces, 1)
+    limit = faces_per_block(topology.corners.is_cpu)
     places, neighbours = _neighbours(topology)
     edges = torch.where(topology.corner_edges < topology.num_interior_edges, topology.corner_edges, 0)
     blocks = []

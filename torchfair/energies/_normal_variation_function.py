@@ -11,7 +11,7 @@ from torch.autograd import Function
 
 from ..geometry import dual_edge_lengths, edge_lengths
 from ..topology import Topology
-from ._normal_variation_blocks import FACES_PER_BLOCK, blocks_of
+from ._normal_variation_blocks import faces_per_block, tables_of
 from ._normal_variation_kernel import energy_and_gradient
 
 
@@ -34,10 +34,10 @@ def fast_path_serves() -> bool:
 def fast_normal_variation(vertices: Tensor, edge_weights: Tensor | None, topology: Topology) -> Tensor:
     """E (*batch,) of ``vertices`` (*batch, V, 3); ``edge_weights`` (*batch, I) or fewer dimensions, same dtype."""
     if edge_weights is not None:
-        batch = torch.broadcast_shapes(vertices.shape[:-2], edge_weights.shape[:-1])
+        batch = torch.broadcast_shapes(vertices.shape[:-2], edge_weights.shape[:-1])  # type: ignore[no-untyped-call]
         vertices = vertices.expand(*batch, -1, -1)
     with_gradient = vertices.requires_grad and torch.is_grad_enabled()
-    energy: Tensor = _Energy.apply(vertices, edge_weights, topology, with_gradient)[0]
+    energy: Tensor = _Energy.apply(vertices, edge_weights, topology, with_gradient)[0]  # type: ignore[no-untyped-call]
     return energy
 
 
@@ -49,7 +49,9 @@ class _Energy(Function):
     """
 
     @staticmethod
-    def forward(ctx: Any, vertices: Tensor, edge_weights: Tensor | None, topology: Topology, with_gradient: bool) -> Any:
+    def forward(
+        ctx: Any, vertices: Tensor, edge_weights: Tensor | None, topology: Topology, with_gradient: bool
+    ) -> Any:
         energy, gradient = _evaluate(vertices, edge_weights, topology, with_gradient)
         ctx.mark_non_differentiable(gradient)
         ctx.save_for_backward(vertices, edge_weights, gradient)
@@ -100,8 +102,7 @@ class _Gradient(Function):
     @staticmethod
     def backward(ctx: Any, *cotangents: Tensor) -> tuple[Tensor | None, ...]:
         inputs = [value for value in ctx.saved_tensors[:3] if value is not None]
-        _, pull_back = torch.func.vjp(_plain_gradient(ctx.topology), *inputs)
-        slopes = pull_back(cotangents[0])
+        slopes = torch.func.vjp(_plain_gradient(ctx.topology), *inputs)[1](cotangents[0])
         return slopes[0], slopes[1], slopes[2] if len(slopes) > 2 else None, None, None
 
     @staticmethod
@@ -124,7 +125,9 @@ def _scaled_gradient(
 ) -> Tensor:
     """``factor * gradient``, differentiable again."""
     if fast_path_serves():
-        scaled: Tensor = _Gradient.apply(factor, vertices, edge_weights, gradient, topology)
+        scaled: Tensor = _Gradient.apply(  # type: ignore[no-untyped-call]
+            factor, vertices, edge_weights, gradient, topology
+        )
         return scaled
     return _plain_gradient(topology)(factor, vertices, edge_weights)
 
@@ -150,18 +153,15 @@ def _evaluate(
     batch, count = vertices.shape[:-2], topology.num_vertices
     flat = vertices.reshape(batch.numel(), count, 3)
     energy = flat.new_empty(flat.shape[0])
-    gradient = flat.new_zeros(3, *flat.shape[:2]) if with_gradient else None
+    gradient = flat.new_empty(flat.shape) if with_gradient else None
     if edge_weights is not None:
-        rows = batch if edge_weights.dim() > 1 else ()
-        edge_weights = edge_weights.expand(*rows, -1).reshape(-1, topology.num_interior_edges)
+        rows = batch if edge_weights.dim() > 1 else torch.Size()
+        edge_weights = edge_weights.expand(*rows, -1).reshape(rows.numel(), topology.num_interior_edges)
     # As many meshes at once as fill one block.
-    step = max(1, FACES_PER_BLOCK // max(topology.num_faces, 1)) if flat.is_cpu else max(flat.shape[0], 1)
+    step = max(1, faces_per_block(flat.is_cpu) // max(topology.num_faces, 1))
     for start in range(0, flat.shape[0], step):
         part = slice(start, start + step)
         weights = edge_weights if edge_weights is None or edge_weights.shape[0] == 1 else edge_weights[part]
-        slope = None if gradient is None else gradient[:, part]
-        energy[part] = energy_and_gradient(flat[part], weights, blocks_of(topology), slope)
-    energy = energy.view(batch)
-    if gradient is None:
-        return energy, flat.new_empty(0)
-    return energy, gradient.view(3, *batch, count).movedim(0, -1).contiguous()
+        slope = None if gradient is None else gradient[part]
+        energy[part] = energy_and_gradient(flat[part], weights, tables_of(topology), slope)
+    return energy.view(batch), flat.new_empty(0) if gradient is None else gradient.view(vertices.shape)

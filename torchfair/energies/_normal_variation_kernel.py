@@ -26,50 +26,65 @@ import torch
 from torch import Tensor
 
 from ..geometry.normals import DEGENERACY
-from ._normal_variation_blocks import Block
+from ._normal_variation_blocks import Block, Tables
+from ._normal_variation_memory import Memory
 
 
 def energy_and_gradient(
-    vertices: Tensor, edge_weights: Tensor | None, blocks: tuple[Block, ...], gradient: Tensor | None
+    vertices: Tensor, edge_weights: Tensor | None, tables: Tables, gradient: Tensor | None
 ) -> Tensor:
-    """Energies (B,) of ``vertices`` (B, V, 3); adds their gradients to ``gradient`` (3, B, V) unless it is None.
+    """Energies (B,) of ``vertices`` (B, V, 3); writes their gradients to ``gradient`` (B, V, 3) unless it is None.
 
     ``edge_weights`` is None, (1, I) or (B, I).
     """
-    positions = vertices.permute(2, 0, 1).contiguous()
-    batch, face_count = positions.shape[1], blocks[-1].stop if blocks else 0
-    side_buffer = positions.new_empty(5, batch, max((block.side_count for block in blocks), default=0))
-    face_buffer = positions.new_empty(4, batch, max((block.face_count for block in blocks), default=0))
-    normals = positions.new_empty(3, batch, face_count)
-    inverse_norms = positions.new_empty(batch, face_count)
-    all_sides = [_side_vectors(positions, block) for block in blocks]
-    for block, (sides, squared) in zip(blocks, all_sides, strict=True):
-        scratch = face_buffer[..., : block.face_count]
-        _write_normals(sides, squared, block.take(normals), block.take(inverse_norms), scratch)
-    energy = positions.new_zeros(batch)
-    for block, (sides, squared) in zip(blocks, all_sides, strict=True):
-        own = block.take(normals)
-        memory = side_buffer[..., : block.side_count].unflatten(-1, sides.shape[2:])
-        jumps, stretch, turn = memory[:3], memory[3], memory[4]
-        _gather(normals, block.neighbours, out=jumps).sub_(own.unsqueeze(2))
-        energy += _terms(squared, jumps, _weights_of(block, edge_weights), stretch, turn)
-        if gradient is not None:
+    with tables.scratch.lend(vertices, _memory_needed(vertices, tables)) as memory:
+        positions = memory.take(3, *vertices.shape[:2]).copy_(vertices.movedim(-1, 0))
+        side_buffer = memory.take(5, vertices.shape[0], tables.most_sides)
+        face_buffer = memory.take(4, vertices.shape[0], tables.most_faces)
+        normals = memory.take(3, vertices.shape[0], tables.face_count)
+        inverse_norms = memory.take(vertices.shape[0], tables.face_count)
+        all_sides = []
+        for block in tables.blocks:
             scratch = face_buffer[..., : block.face_count]
-            pull = _pull(jumps, turn, own, block.take(inverse_norms), scratch)
-            _scatter(_forces(sides, pull, stretch, out=jumps), block, gradient)
+            sides, squared = _side_vectors(positions, block, scratch, memory)
+            _write_normals(sides, squared, block.take(normals), block.take(inverse_norms), scratch)
+            all_sides.append((sides, squared))
+        energy = vertices.new_zeros(vertices.shape[0])
+        forces = positions.zero_()  # the positions have been used up
+        for block, (sides, squared) in zip(tables.blocks, all_sides, strict=True):
+            own = block.take(normals)
+            buffer = side_buffer[..., : block.side_count].view(5, *squared.shape)
+            jumps, stretch, turn = buffer[:3], buffer[3], buffer[4]
+            _gather(normals, block.neighbours, out=jumps).sub_(own.unsqueeze(2))
+            energy += _terms(squared, jumps, _weights_of(block, edge_weights), stretch, turn)
+            if gradient is not None:
+                scratch = face_buffer[..., : block.face_count]
+                pull = _pull(jumps, turn, own, block.take(inverse_norms), scratch)
+                _scatter(_forces(sides, pull, stretch, out=jumps), block, forces)
+        if gradient is not None:
+            gradient.copy_(forces.movedim(0, -1))
     return energy.div_(2)
 
 
-def _side_vectors(positions: Tensor, block: Block) -> tuple[Tensor, Tensor]:
+def _memory_needed(vertices: Tensor, tables: Tables) -> int:
+    batch = vertices.shape[0]
+    shapes = [(3, *vertices.shape[:2]), (5, batch, tables.most_sides), (4, batch, tables.most_faces)]
+    shapes += [(3, batch, tables.face_count), (batch, tables.face_count)]
+    for block in tables.blocks:
+        shapes += [(3, batch, block.side_count), (batch, block.side_count)]
+    return sum(Memory.size(*shape) for shape in shapes)
+
+
+def _side_vectors(positions: Tensor, block: Block, scratch: Tensor, memory: Memory) -> tuple[Tensor, Tensor]:
     """``e_j`` (3, B, k, n) and ``|e_j|^2`` (B, k, n)."""
-    sides = positions.new_empty(3, positions.shape[1], block.corner_count, block.face_count)
+    shape = (positions.shape[1], block.corner_count, block.face_count)
+    sides, squared = memory.take(3, *shape), memory.take(*shape)
     _gather(positions, block.corners_short, out=sides)
-    first = sides[:, :, 0].clone()
+    first = scratch[:3].copy_(sides[:, :, 0])
     for j in range(block.corner_count - 1):
         sides[:, :, j].sub_(sides[:, :, j + 1])
     sides[:, :, -1].sub_(first)
-    squared = torch.empty_like(sides[0])
-    _square(sides, out=squared)
+    _dot(sides, sides, out=squared)
     return sides, squared
 
 
@@ -84,7 +99,7 @@ def _write_normals(
     limits = torch.finfo(sides.dtype)
     squared, valid = scratch[:2]
     _double_area(sides, out=normals)
-    _square(normals, out=squared)
+    _dot(normals, normals, out=squared)
     torch.sum(squared_lengths, 1, out=valid)
     torch.gt(squared, valid.square_().mul_((2 * DEGENERACY * limits.eps) ** 2), out=valid)  # 1 or 0 from here on
     torch.rsqrt(squared, out=inverse_norms).clamp_(max=limits.tiny**-0.5).mul_(valid)
@@ -97,7 +112,7 @@ def _terms(squared: Tensor, jumps: Tensor, weights: Tensor | None, stretch: Tens
 
     Both ratios are 0 where ``|e| |d|`` is 0 or infinite: flat edges, boundary, zero length, degenerate faces.
     """
-    _square(jumps, out=stretch)
+    _dot(jumps, jumps, out=stretch)
     torch.mul(squared, stretch, out=turn).rsqrt_()  # one root serves both: 1/(|e| |d|)
     torch.nan_to_num(turn, nan=0.0, posinf=0.0, out=turn)
     if weights is not None:
@@ -114,7 +129,7 @@ def _pull(jumps: Tensor, turn: Tensor, normals: Tensor, inverse_norms: Tensor, s
     torch.mul(turn[:, 0], jumps[:, :, 0], out=pull)
     for j in range(1, turn.shape[1]):
         pull.addcmul_(turn[:, j], jumps[:, :, j])
-    torch.mul(pull[0], normals[0], out=along).addcmul_(pull[1], normals[1]).addcmul_(pull[2], normals[2])
+    _dot(pull, normals, out=along)
     return pull.addcmul_(along, normals, value=-1).mul_(inverse_norms)
 
 
@@ -132,10 +147,10 @@ def _forces(sides: Tensor, pull: Tensor, stretch: Tensor, out: Tensor) -> Tensor
     return out
 
 
-def _scatter(forces: Tensor, block: Block, gradient: Tensor) -> None:
+def _scatter(forces: Tensor, block: Block, totals: Tensor) -> None:
     """Adds forces (3, B, k, n) on corners to their vertices (3, B, V)."""
-    batch = gradient.shape[1]
-    for force, total in zip(forces, gradient, strict=True):
+    batch = totals.shape[1]
+    for force, total in zip(forces, totals, strict=True):
         if batch == 1:
             total[0].scatter_add_(0, block.corners, force.view(-1))
         else:
@@ -157,7 +172,7 @@ def _weights_of(block: Block, edge_weights: Tensor | None) -> Tensor | None:
     """Weights (1 or B, k, n) of the sides of a block."""
     if edge_weights is None or edge_weights.shape[1] == 0:
         return None
-    return edge_weights.index_select(1, block.edges).unflatten(1, (block.corner_count, block.face_count))
+    return edge_weights.index_select(1, block.edges).view(-1, block.corner_count, block.face_count)
 
 
 def _double_area(sides: Tensor, out: Tensor) -> None:
@@ -171,10 +186,12 @@ def _double_area(sides: Tensor, out: Tensor) -> None:
 
 def _cross(x: Tensor, y: Tensor, out: Tensor) -> None:
     """``x`` cross ``y``, coordinates first."""
+    xs, ys, outs = x.unbind(), y.unbind(), out.unbind()
     for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        torch.mul(x[b], y[c], out=out[a]).addcmul_(x[c], y[b], value=-1)
+        torch.mul(xs[b], ys[c], out=outs[a]).addcmul_(xs[c], ys[b], value=-1)
 
 
-def _square(x: Tensor, out: Tensor) -> None:
-    """Squared length, coordinates first."""
-    torch.mul(x[0], x[0], out=out).addcmul_(x[1], x[1]).addcmul_(x[2], x[2])
+def _dot(x: Tensor, y: Tensor, out: Tensor) -> None:
+    """Scalar product, coordinates first."""
+    xs, ys = x.unbind(), y.unbind()
+    torch.mul(xs[0], ys[0], out=out).addcmul_(xs[1], ys[1]).addcmul_(xs[2], ys[2])

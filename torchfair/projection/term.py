@@ -61,7 +61,7 @@ class ElementTerm:
 
     @property
     def num_elements(self) -> int:
-        """N: number of elements."""
+        """N, the number of elements."""
         return self.stencil[0][1].shape[0]
 
     def check(self, layout: Layout) -> None:

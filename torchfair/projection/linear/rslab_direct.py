@@ -11,7 +11,6 @@ from ...errors import SingularSystemError
 from ..system import Structure
 from .direct import SparseDirect, Substitution
 
-
 _SMALL = 2_000_000  # entries of the lower triangle below which one thread factors as fast as several
 
 
