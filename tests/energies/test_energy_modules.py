@@ -306,3 +306,12 @@ def test_a_fresh_topology_may_first_be_used_inside_nested_transforms() -> None:
     torch.func.vjp(torch.func.grad(total), vertices)[1](vertices)
     assert torch.func.grad(total)(vertices).isfinite().all()
     assert total(vertices).isfinite()
+
+
+@pytest.mark.parametrize(
+    "name", ["normal_variation_per_edge", "angle_variation_per_edge", "total_mean_curvature_per_edge"]
+)
+def test_nan_vertices_do_not_pass_for_a_flat_mesh(name: str) -> None:
+    vertices, topology = wavy_grid(5, 5, triangles=True)
+    vertices[7, 1] = float("nan")
+    assert getattr(energies, name)(vertices, topology).isnan().any()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .arguments import non_negative, positive_count, positive_or_none, vertex_target
 from .errors import CommandError
 from .fair_outputs import Outputs
+from .inputs import read_input
 
 if TYPE_CHECKING:
     from ..formfinding import FairResult, FairSettings
@@ -74,20 +75,6 @@ def run(arguments: argparse.Namespace) -> int:
     print(summary(result))
     print("\n".join(f"wrote {path}" for path in outputs.paths()))
     return 0
-
-
-def read_input(name: str, repair: bool) -> PolygonMesh:
-    """A mesh file, or a built-in example ``example:NAME``."""
-    from ..io import PolygonMesh, load_mesh
-
-    if not name.startswith("example:"):
-        return load_mesh(name, repair=repair)
-    from ..shapes import EXAMPLES, builtin_mesh
-
-    example = name.removeprefix("example:")
-    if example not in EXAMPLES:
-        raise CommandError(f"there is no example '{example}': choose {', '.join(sorted(EXAMPLES))}")
-    return PolygonMesh(*builtin_mesh(example))
 
 
 def solve(

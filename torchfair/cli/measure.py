@@ -7,6 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from .arguments import count
+from .inputs import read_input
 from .plain import to_json
 
 if TYPE_CHECKING:
@@ -24,7 +25,9 @@ def add_parser(subparsers: Any) -> None:
     parser: argparse.ArgumentParser = subparsers.add_parser(
         "measure", help="print the smoothness of a mesh", description=_DESCRIPTION, allow_abbrev=False
     )
-    parser.add_argument("input", metavar="INPUT", help="mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh)")
+    parser.add_argument(
+        "input", metavar="INPUT", help="mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh), or example:roof"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of tables")
     parser.add_argument("--worst", type=count, default=10, metavar="N", help="list the N worst edges (default 10)")
     parser.add_argument(
@@ -35,10 +38,9 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, measures, prints."""
-    from ..io import load_mesh
     from .measurements import measure_mesh, worst_edges
 
-    mesh = load_mesh(arguments.input, repair=arguments.repair)
+    mesh = read_input(arguments.input, arguments.repair)
     quantities = measure_mesh(mesh.vertices, mesh.topology)
     worst = worst_edges(mesh.vertices, mesh.topology, arguments.worst)
     if arguments.json:

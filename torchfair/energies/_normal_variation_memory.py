@@ -12,7 +12,7 @@ _ALIGNMENT = 64
 
 
 class Scratch:
-    """Memory kept from one evaluation to the next, about 150 bytes per triangle in float64.
+    """Memory kept from one evaluation to the next, about 140 bytes per triangle in float64.
 
     Asking the operating system for it anew takes longer than all that is then done with it. Only CPU memory
     is kept: other devices have allocators of their own for this. Copies and pickles start without.

@@ -38,7 +38,8 @@ def normal_variation(vertices: Tensor, topology: Topology, edge_weights: Tensor 
     The gradient is that of Prop. 2 of the paper in closed form, computed together with the value and about
     as fast as the value alone. It equals the gradient of the plain formula to rounding, as do all further
     derivatives, which come from that formula. Under ``torch.compile`` and inside transforms of
-    ``torch.func`` the plain formula serves throughout.
+    ``torch.func`` the plain formula serves throughout. On CPUs the topology keeps index tables and scratch
+    memory for the next evaluation, about 200 bytes per triangle in float64.
 
     Args:
         vertices: positions (*batch, V, 3), any length unit.

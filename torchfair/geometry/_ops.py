@@ -44,7 +44,7 @@ def norm(x: Tensor) -> Tensor:
     and zero vectors are common here (edges of degenerate faces, normals beside flat edges).
     """
     squared = dot(x, x)
-    positive = squared > 0
+    positive = ~(squared <= 0)
     # The inner where keeps sqrt away from zero, whose infinite slope would turn the masked zero into NaN.
     return torch.where(positive, torch.where(positive, squared, 1.0).sqrt(), 0.0)
 

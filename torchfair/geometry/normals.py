@@ -107,7 +107,7 @@ def unit_normal(corners: Tensor) -> Tensor:
 def normalise(x: Tensor, threshold: Tensor | float) -> Tensor:
     """``x / |x|`` where ``|x| > threshold``, else the zero vector with zero derivatives."""
     size = norm(x.detach())
-    valid = size > threshold
+    valid = ~(size <= threshold)  # NaN stays NaN: bad input must not pass for a flat mesh
     # Dividing by a constant first leaves all derivatives as they are and keeps powers of tiny lengths out of them.
     scaled = x / torch.where(valid, size, 1.0)[..., None]
     safe = torch.where(valid[..., None], scaled, 1.0)

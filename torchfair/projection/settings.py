@@ -19,7 +19,8 @@ class ProjectionSettings:
             damps all unknowns alike, the paper's ``w_reg |X - X_prev|^2``.
         gradient_tolerance: Stop when the scaled gradient is below this.
         step_tolerance: Stop when an accepted step is below this, relative to the size of the unknowns.
-        merit_tolerance: Stop when the merit fell by less than this fraction over ``patience`` steps.
+        merit_tolerance: Stop when each of the last ``patience`` accepted steps lowered the merit by less than
+            this fraction (four times as many steps while the damping is above its start).
         patience: See ``merit_tolerance``.
         least_extrapolation: A step that gained more than predicted is tried again at the length at which a
             parabola through what was seen is smallest, if that is more than this many times longer;
