@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import torch
 from geometry_meshes import DEGENERATE, GENERIC, icosphere, mixed_grid
-from helpers import DOUBLE, wavy_grid
+from helpers import DOUBLE, random_rotation, wavy_grid
 from hypothesis import given, settings
 from torch import Tensor
 from torch.autograd import forward_ad
@@ -204,6 +204,14 @@ def test_results_survive_later_evaluations_that_reuse_the_scratch_memory():
         torch.testing.assert_close(gradient_of(normal_variation, vertices, twin), expected)
 
 
+def test_pickles_do_not_carry_the_scratch_memory():
+    vertices, topology = mixed_grid()
+    normal_variation(vertices.float(), topology)
+    size = len(pickle.dumps(topology))
+    normal_variation(torch.stack([vertices] * 50), topology)
+    assert len(pickle.dumps(topology)) == size
+
+
 def test_threads_may_share_a_topology():
     vertices, topology = icosphere(3)
     scales = torch.linspace(1, 2, 64).tolist()
@@ -266,6 +274,14 @@ def check_degenerate(vertices: Tensor, topology: Topology) -> None:
         (slope * torch.linspace(-1, 1, 3).to(slope)).sum(), variable, materialize_grads=True
     )
     assert second.isfinite().all()
+
+
+def test_nearly_flat_edges_do_not_cost_digits():
+    """l/l* is 1e6 here: rounding of normals along themselves must not get into the gradient."""
+    vertices, topology = GENERIC["triangles"]()
+    flattened = vertices * torch.tensor([1, 1, 1e-6], dtype=DOUBLE) @ random_rotation(1).T
+    ours, theirs = gradient_of(normal_variation, flattened, topology), gradient_of(plain, flattened, topology)
+    torch.testing.assert_close(ours, theirs, rtol=0, atol=1e-13)
 
 
 def test_sides_of_length_zero_are_safe_where_the_face_has_area():

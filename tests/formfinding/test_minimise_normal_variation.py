@@ -267,3 +267,14 @@ def test_bad_input_is_refused() -> None:
         FairSettings(closeness_weight=-1.0)
     with pytest.raises(ValueError, match="distance_limit"):
         FairSettings(distance_limit=0.0)
+
+
+def test_handle_out_of_reach_is_said() -> None:
+    """Pulling a corner of the fan through its neighbour would turn faces over; the bounds hold and a note says so."""
+    vertices, topology = saddle("triangles", n=5)
+    target = vertices[12] + 3.0 * (vertices[13] - vertices[12])
+    settings = FairSettings(boundary="fixed", distance_limit=None, planar="none")
+    result = minimise_normal_variation(vertices, topology, handles={12: target.tolist()}, settings=settings)
+    assert result.after["largest_handle_distance"] > 0.5
+    assert any("a handle ends" in note for note in result.notes)
+    assert result.after["flipped_faces"] == 0

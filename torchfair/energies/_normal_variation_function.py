@@ -54,20 +54,22 @@ class _Energy(Function):
     ) -> Any:
         energy, gradient = _evaluate(vertices, edge_weights, topology, with_gradient)
         ctx.mark_non_differentiable(gradient)
+        ctx.set_materialize_grads(False)  # spares backward a tensor of zeros for the gradient
         ctx.save_for_backward(vertices, edge_weights, gradient)
         ctx.save_for_forward(vertices, edge_weights, gradient)
         ctx.topology = topology
         return energy, gradient
 
     @staticmethod
-    def backward(ctx: Any, *cotangents: Tensor) -> tuple[Tensor | None, Tensor | None, None, None]:
+    def backward(ctx: Any, *cotangents: Tensor | None) -> tuple[Tensor | None, Tensor | None, None, None]:
         vertices, edge_weights, gradient = ctx.saved_tensors
+        factor = cotangents[0]
         along_vertices = along_weights = None
-        if ctx.needs_input_grad[0]:
-            along_vertices = _scaled_gradient(cotangents[0], vertices, edge_weights, gradient, ctx.topology)
-        if ctx.needs_input_grad[1]:
-            terms = cotangents[0][..., None] * plain_terms(vertices, ctx.topology)
-            along_weights = terms.sum_to_size(edge_weights.shape)
+        if factor is not None and ctx.needs_input_grad[0]:
+            along_vertices = _scaled_gradient(factor, vertices, edge_weights, gradient, ctx.topology)
+        if factor is not None and ctx.needs_input_grad[1]:
+            # Autograd itself sums over dimensions along which the weights were repeated.
+            along_weights = factor[..., None] * plain_terms(vertices, ctx.topology)
         return along_vertices, along_weights, None, None
 
     @staticmethod

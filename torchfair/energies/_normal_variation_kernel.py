@@ -108,9 +108,10 @@ def _write_normals(
 
 
 def _terms(squared: Tensor, jumps: Tensor, weights: Tensor | None, stretch: Tensor, turn: Tensor) -> Tensor:
-    """Sum (B,) of ``|e| |d|``, given ``|e|^2`` (overwritten) and d; writes ``|d|/|e|`` and ``|e|/|d|`` (B, k, n).
+    """Sum (B,) of ``|e| |d|``, given ``|e|^2`` (overwritten) and d.
 
-    Both ratios are 0 where ``|e| |d|`` is 0 or infinite: flat edges, boundary, zero length, degenerate faces.
+    Writes ``|d|/|e|`` to ``stretch`` and ``|e|/|d|`` to ``turn`` (B, k, n). Both are 0 where ``|e| |d|`` is 0
+    or infinite: flat edges, boundary, zero length, degenerate faces.
     """
     _dot(jumps, jumps, out=stretch)
     torch.mul(squared, stretch, out=turn).rsqrt_()  # one root serves both: 1/(|e| |d|)
@@ -129,6 +130,7 @@ def _pull(jumps: Tensor, turn: Tensor, normals: Tensor, inverse_norms: Tensor, s
     torch.mul(turn[:, 0], jumps[:, :, 0], out=pull)
     for j in range(1, turn.shape[1]):
         pull.addcmul_(turn[:, j], jumps[:, :, j])
+    # Although <n, d> = -|d|^2 / 2 is known, only this removes the rounding of |n|, grown large by |e|/|d|.
     _dot(pull, normals, out=along)
     return pull.addcmul_(along, normals, value=-1).mul_(inverse_norms)
 

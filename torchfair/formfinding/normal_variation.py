@@ -23,6 +23,7 @@ Mesh = tuple[Tensor, Topology]
 
 _SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
 _LARGEST_SHARE = 1.3
+_HANDLE_REACHED = 0.05  # mean edge lengths
 
 
 @dataclass(frozen=True)
@@ -119,12 +120,18 @@ def minimise_normal_variation(
             shares.append(share + _SHARE_STEP)
     state = runs[-1].blocks["vertices"]
     moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(state))
+    after = fair_measures(moved, start, topology, problem, normalisation)
+    if after["largest_handle_distance"] > _HANDLE_REACHED * normalisation.length:
+        problem.notes.append(
+            f"a handle ends {after['largest_handle_distance']:.3g} from its target: faces would become too small "
+            "or too thin; allow smaller angles and areas, or pull less"
+        )
     return FairResult(
         vertices=moved.to(vertices),
         projection=runs[-1],
         preparation=runs[:-1],
         before=fair_measures(start, start, topology, problem, normalisation),
-        after=fair_measures(moved, start, topology, problem, normalisation),
+        after=after,
         notes=problem.notes,
     )
 

@@ -89,7 +89,7 @@ class Iteration:
             with self._timed("linearise"):
                 system = self.problem.structure.linearise(self.best)
                 scale = self._scale(system)
-            gradient = float((system.gradient.abs() / scale.sqrt()).max())
+                gradient = float((system.gradient.abs() / scale.sqrt()).max())
             if gradient <= self.settings.gradient_tolerance:
                 return Status.GRADIENT_TOLERANCE, ""
             accepted = False
@@ -157,22 +157,24 @@ class Iteration:
                 self.best = trial
 
     def _settled(self, before: float, damping: float) -> Status | None:
-        """Whether the merit has come to rest; tightens an iterative linear solver first.
+        """Whether the merit has come to rest; if so, with an iterative linear solver also when that is tightened.
 
-        Steps that heavy damping kept short say little, so more of them are waited for.
+        Steps that heavy damping kept short say little, so more of them are waited for. A relative remainder
+        changes the decrease of the merit by its square, hence the tightest one worth asking for.
         """
         if self.best.merit == 0.0:
             return Status.ZERO_MERIT
         settings = self.settings
         patience = settings.patience * (1 if damping <= settings.initial_damping else _PATIENCE_WHEN_DAMPED)
         self.recent.append((before - self.best.merit) / before)
-        largest = max(self.recent[-patience:]) if len(self.recent) >= patience else math.inf
-        loose = self.problem.solver.inexact and self.accuracy > _TIGHTEST_ACCURACY
-        if loose and largest < max(self.accuracy, settings.merit_tolerance):
-            self.accuracy *= 0.1
+        if len(self.recent) < patience or max(self.recent[-patience:]) >= settings.merit_tolerance:
+            return None
+        tightest = max(0.1 * math.sqrt(settings.merit_tolerance), _TIGHTEST_ACCURACY)
+        if self.problem.solver.inexact and self.accuracy > tightest:
+            self.accuracy = max(0.1 * self.accuracy, tightest)
             self.recent = []
             return None
-        return Status.MERIT_TOLERANCE if largest < settings.merit_tolerance else None
+        return Status.MERIT_TOLERANCE
 
     def _scale(self, system: LinearSystem) -> Tensor:
         """Positive diagonal that the damping multiplies; one where nothing is felt."""

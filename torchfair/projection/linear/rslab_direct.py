@@ -36,7 +36,8 @@ class RslabDirect(SparseDirect):
         ones = np.ones(pattern.rows.size)
         ones[pattern.offsets[:-1]] = self._size
         lower = sp.csc_matrix((ones, pattern.rows, pattern.offsets), (self._size, self._size))
-        self._symbolic = rslab.analyze(lower, path="ldlt")
+        # Nested dissection takes part in the race of orderings from small sizes on: a fifth less work per factor.
+        self._symbolic = rslab.analyze(lower, path="ldlt", race_nd_min_n=1000, race_nd_min_work=1_000_000)
 
     def factorise(self, values: np.ndarray) -> Substitution:
         """See :class:`SparseDirect`."""

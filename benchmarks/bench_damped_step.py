@@ -1,0 +1,248 @@
+"""Where the time of one damped step goes: Jacobian, assembly, factorisation, solve, merit.
+
+Run ``python benchmarks/bench_damped_step.py [--sizes 2784 10000 50000 200000] [--threads 2] [--json FILE]``.
+
+The engine lowers E of a noisy torus (see ``torus_problem.py``) for a few steps, several times from the same
+start, all linear solvers in turn. Every figure is the least of the repetitions of one step, then the median of
+the steps, in milliseconds. Processor time beside wall time tells how busy the machine was otherwise: on a quiet
+one, wall time is the smaller of the two as soon as there are two threads.
+
+=============  =========================================================================================
+Jacobian       residuals weighted, element Jacobians, gradient, damping scale
+assembly       direct: the normal matrix; iterative: the stored Jacobian, its transpose, diagonal blocks
+factor, solve  direct: factorisation, then substitution; iterative: all inner iterations
+merit          residuals of the trial state (twice where the step is extrapolated)
+other          everything else in the engine
+=============  =========================================================================================
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import resource
+import statistics
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import scipy
+import torch
+from torch import Tensor
+from torus_problem import torus_problem
+
+import torchfair
+from torchfair.projection import GuidedProjection, IterationRecord, ProjectionSettings
+from torchfair.projection.linear import ConjugateGradients, LinearSolver, RslabDirect, ScipyDirect, Step
+from torchfair.projection.system import LinearSystem, Structure
+
+PARTS = ("jacobian", "assembly", "factor", "solve", "merit", "other", "whole")
+TARGETS = {("rslab", 2784): 60.0, ("rslab", 10000): 250.0}  # milliseconds of the whole step
+TARGETS |= {("cg", 2784): 20.0, ("cg", 10000): 120.0, ("cg", 50000): 300.0, ("cg", 200000): 3000.0}
+LARGEST = {"rslab": 60_000, "scipy": 12_000, "cg": 10**9}  # sizes at which each solver is tried
+LARGEST_SHARE = 0.25  # of a direct step, outside factorisation and solve
+
+Seconds = tuple[float, float]  # wall, processor
+
+
+def now() -> Seconds:
+    return time.perf_counter(), time.process_time()
+
+
+class Clock:
+    """Adds up the time of the parts of each step."""
+
+    def __init__(self) -> None:
+        self.steps: list[dict[str, Seconds]] = []
+        self.begin()
+
+    def begin(self) -> None:
+        self._parts: dict[str, Seconds] = defaultdict(lambda: (0.0, 0.0))
+        self._start = now()
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        start = now()
+        yield
+        end, sum_ = now(), self._parts[name]
+        self._parts[name] = (sum_[0] + end[0] - start[0], sum_[1] + end[1] - start[1])
+
+    def timed(self, name: str, function: Callable[..., object]) -> Callable[..., object]:
+        def call(*arguments: object) -> object:
+            with self.part(name):
+                return function(*arguments)
+
+        return call
+
+    def end_step(self, record: IterationRecord) -> None:
+        end, known = now(), list(self._parts.values())
+        whole = (end[0] - self._start[0], end[1] - self._start[1])
+        self._parts["whole"] = whole
+        self._parts["other"] = (whole[0] - sum(k[0] for k in known), whole[1] - sum(k[1] for k in known))
+        if record.iteration:
+            self.steps.append(dict(self._parts))
+        self.begin()
+
+
+class TimedDirect:
+    """A direct solver whose assembly, factorisation and substitution are timed."""
+
+    inexact = False
+
+    def __init__(self, solver: RslabDirect | ScipyDirect, clock: Clock) -> None:
+        self.name, self.prepare = solver.name, solver.prepare
+        self._solver = solver
+        self._assemble = clock.timed("assembly", solver.assemble)
+        self._factorise, self._clock = clock.timed("factor", solver.factorise), clock
+
+    def solve(self, system: LinearSystem, damping: Tensor, accuracy: float) -> Step:
+        substitute = self._factorise(self._assemble(system, damping))
+        with self._clock.part("solve"):
+            change = torch.from_numpy(substitute(-system.gradient.numpy())).to(system.gradient)
+        return Step(change, torch.zeros_like(change))
+
+
+class TimedIterative(ConjugateGradients):
+    """Conjugate gradients whose assembly is timed apart."""
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__()
+        self._clock = clock
+
+    def solve(self, system: LinearSystem, damping: Tensor, accuracy: float) -> Step:
+        with self._clock.part("assembly"):
+            system.jacobian  # noqa: B018  (stored now, used by the solver)
+            system.diagonal_blocks  # noqa: B018
+        with self._clock.part("solve"):
+            return super().solve(system, damping, accuracy)
+
+
+class Case:
+    """One size with one solver, prepared to be run again and again."""
+
+    def __init__(self, name: str, size: int, steps: int) -> None:
+        self.name, self.size = name, size
+        self.clock = Clock()
+        self.runs: list[list[dict[str, Seconds]]] = []
+        self.inner: list[int] = []
+        solver: LinearSolver = {
+            "rslab": lambda: TimedDirect(RslabDirect(), self.clock),
+            "scipy": lambda: TimedDirect(ScipyDirect(), self.clock),
+            "cg": lambda: TimedIterative(self.clock),
+        }[name]()
+        self.start, terms = torus_problem(size)
+        begin = now()
+        self.problem = GuidedProjection(self.start, terms, solver=solver)
+        self._prepare()
+        self.problem.prepare()
+        end = now()
+        self.setup = (end[0] - begin[0], end[1] - begin[1])
+        self._time(self.problem.structure)
+        # Tolerances are off: every run makes the same steps, all with the first accuracy of the inner iteration.
+        self.settings = ProjectionSettings(
+            max_iterations=steps, initial_damping=0.1, damping_scale="identity", merit_tolerance=0.0, patience=10**6
+        )
+
+    def _prepare(self) -> None:
+        """Builds the index maps, which the engine would do in the first step."""
+        structure = self.problem.structure
+        system = structure.linearise(self.start)
+        system.gradient  # noqa: B018
+        if self.name == "cg":
+            system.jacobian, system.diagonal_blocks  # noqa: B018
+        else:
+            system.normal_values  # noqa: B018
+
+    def _time(self, structure: Structure) -> None:
+        linearise = structure.linearise
+
+        def all_of_it(*arguments: object) -> LinearSystem:
+            system = linearise(*arguments)
+            system.gradient, system.diagonal  # noqa: B018
+            return system
+
+        structure.linearise = self.clock.timed("jacobian", all_of_it)
+        structure.evaluate = self.clock.timed("merit", structure.evaluate)
+
+    def run(self) -> None:
+        self.clock.steps = []
+        result = self.problem.solve(self.start, settings=self.settings, callback=self._on_step)
+        self.runs.append(self.clock.steps)
+        self.inner = [record.inner_iterations for record in result.history[1:]]
+        self.merit = result.merit
+
+    def _on_step(self, record: IterationRecord) -> None:
+        self.clock.end_step(record)
+
+    def result(self) -> dict[str, object]:
+        """Least of the runs for each step, then the median of the steps; milliseconds."""
+        row: dict[str, object] = {"vertices": self.start["vertices"].shape[0], "solver": self.name}
+        for index, kind in enumerate(("wall_ms", "processor_ms")):
+            row[kind] = {
+                part: 1e3
+                * statistics.median(
+                    min(run[step].get(part, (0.0, 0.0))[index] for run in self.runs)
+                    for step in range(len(self.runs[0]))
+                )
+                for part in PARTS
+            }
+        row["setup_s"] = dict(zip(("wall", "processor"), self.setup, strict=True))
+        row["inner_iterations"], row["merit"] = self.inner, self.merit
+        row["peak_memory_gib"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+        row["target_ms"] = TARGETS.get((self.name, self.size))
+        return row
+
+
+def report(row: dict[str, object]) -> None:
+    for kind in ("wall_ms", "processor_ms"):
+        parts = row[kind]
+        label = f"{row['vertices']:>7} {row['solver']:6}" if kind == "wall_ms" else f"{'processor':>14}"
+        print(label, *(f"{parts[part]:9.2f}" for part in PARTS), end="")
+        if kind == "processor_ms":
+            print()
+            continue
+        outside = 1.0 - (parts["factor"] + parts["solve"]) / parts["whole"]
+        share = (
+            f"{100 * outside:4.0f} %" if parts["factor"] else f"{statistics.median(row['inner_iterations']):4.0f} it"
+        )
+        target = row["target_ms"]
+        verdict = "" if target is None else f"{target:7.0f} {'met' if parts['whole'] <= target else 'MISSED'}"
+        print(f" {share}  setup {row['setup_s']['wall']:6.2f} s  {row['peak_memory_gib']:5.2f} GiB  {verdict}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sizes", type=int, nargs="+", default=[2784, 10000, 50000, 200000])
+    parser.add_argument("--solvers", nargs="+", default=["rslab", "scipy", "cg"], choices=["rslab", "scipy", "cg"])
+    parser.add_argument("--threads", type=int, default=torch.get_num_threads())
+    parser.add_argument("--steps", type=int, default=6, help="damped steps in each run (default: %(default)s)")
+    parser.add_argument("--repeats", type=int, default=5, help="runs of each case (default: %(default)s)")
+    parser.add_argument("--json", type=Path, help="write the figures to this file")
+    options = parser.parse_args()
+    torch.set_num_threads(options.threads)
+    print(f"{options.threads} thread(s), load {os.getloadavg()[0]:.1f}; milliseconds")
+    print(f"{'V':>7} {'solver':6}", *(f"{part:>9}" for part in PARTS), " outside  ...  target")
+    rows = []
+    for size in options.sizes:
+        names = [name for name in options.solvers if size <= LARGEST[name]]
+        cases = [Case(name, size, options.steps) for name in names if name != "rslab" or RslabDirect.available()]
+        for _ in range(options.repeats):
+            for case in cases:
+                case.run()
+        for case in cases:
+            rows.append(case.result())
+            report(rows[-1])
+    if options.json:
+        versions = {module.__name__: module.__version__ for module in (torchfair, torch, np, scipy)}
+        machine = {"python": platform.python_version(), "processors": os.cpu_count(), "load": os.getloadavg()}
+        document = {"threads": options.threads, "machine": machine | versions, "rows": rows}
+        options.json.write_text(json.dumps(document, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,259 @@
+"""Every experiment at a tiny size: the claim that its JSON carries holds, and it behaves as a program should."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from helpers import DOUBLE
+
+from torchfair import Topology
+from torchfair.geometry import angle_defects, planarity
+from torchfair.io import load_mesh
+
+FOLDER = Path(__file__).parents[2] / "experiments"
+SCRIPTS = sorted(path.stem for path in FOLDER.glob("[!_]*.py"))
+
+Run = Callable[..., dict[str, Any]]
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
+    """Imports a script as the command line would find it."""
+    monkeypatch.syspath_prepend(str(FOLDER))
+    return importlib.import_module
+
+
+@pytest.fixture
+def run(script: Callable[[str], ModuleType], tmp_path: Path) -> Run:
+    """Runs a script in a folder and returns its JSON; the exit code must be as expected."""
+
+    def call(name: str, *options: str, code: int = 0, folder: str = "out") -> dict[str, Any]:
+        out = tmp_path / folder
+        assert script(name).main(["--output", str(out), "--width", "400", *options]) == code
+        result = out / "result.json"
+        return json.loads(result.read_text()) if result.exists() else {}
+
+    return call
+
+
+# ---- claims --------------------------------------------------------------------------------------------
+
+
+def test_energy_of_principal_meshes_converges_to_c_and_that_of_others_does_not(run: Run, tmp_path: Path) -> None:
+    report = run("fig07_principal_meshes", "--surfaces", "enneper", "torus", "--rows", "8", "16", "32",
+                 "--drawn-rows", "3", "4", "5")  # fmt: skip
+    enneper, torus = report["surfaces"]["enneper"], report["surfaces"]["torus"]
+    assert enneper["order_inside"] >= 1.9
+    assert enneper["order"] == pytest.approx(1, abs=0.1)  # against C of the whole patch
+    assert torus["order"] >= 1.9
+    assert enneper["smallest_ratio_others"] > 1.15
+    assert torus["smallest_ratio_others"] > 1.02
+    for surface in (enneper, torus):
+        rows = surface["meshings"]
+        for name in surface["finest_ratio_others"]:  # not on the way to C, but away from it or steady
+            assert rows[name][-1]["ratio"] > 0.99 * rows[name][0]["ratio"]
+        cut, whole = surface["finest_ratio_principal_cut"], surface["finest_ratio_principal"]
+        assert cut == pytest.approx(whole, abs=2e-3)
+    mesh = load_mesh(tmp_path / "out" / "principal_fine.obj")
+    assert mesh.topology.is_quadrangular
+    assert load_mesh(tmp_path / "out" / "irregular.obj").topology.is_triangular
+
+
+def test_parameter_lines_of_the_moulding_surface_are_principal(script: Callable[[str], ModuleType]) -> None:
+    surface = script("fig07_principal_meshes").Moulding()
+    (u0, u1), (v0, v1) = surface.domain
+    u, v = torch.meshgrid(
+        torch.linspace(u0, u1, 9, dtype=DOUBLE), torch.linspace(v0, v1, 9, dtype=DOUBLE), indexing="ij"
+    )
+    first, second = surface.fundamental_forms(u, v)
+    assert first[..., 1].abs().max() < 1e-12
+    assert second[..., 1].abs().max() < 1e-12
+    curvature = surface.gaussian_curvature(u, v)
+    assert curvature.min() < -0.01
+    assert curvature.max() > 0.01
+
+
+def test_energy_per_area_is_minimal_for_rectangles_only_where_k_is_negative(run: Run) -> None:
+    report = run("fig11_energy_per_area", "--steps", "36", "--cells", "2")
+    saddle, bowl = report["saddle"], report["bowl"]
+    for paraboloid in (saddle, bowl):
+        assert paraboloid["smallest_planar"] == pytest.approx(1, abs=1e-3)
+        assert paraboloid["largest_planarity"] < 1e-12
+        assert paraboloid["largest_deviation_from_formula"] < 1e-3
+        assert paraboloid["largest_influence_of_length"] < 2e-3
+        assert min(paraboloid["smallest_cut"].values()) > 1 - 1e-3
+    assert saddle["smallest_planar_at_degrees"] % 90 == 0
+    assert saddle["smallest_planar_10_degrees_away"] > 1.03
+    assert bowl["largest_planar_below_10"] == pytest.approx(1, abs=1e-3)  # the same at every angle
+    assert saddle["smallest_cut"]["rhombi of 60°, cut"] > 1.1
+
+
+def test_stars_of_a_finite_size_stay_above_the_bound(script: Callable[[str], ModuleType]) -> None:
+    module = script("fig11_energy_per_area")
+    coefficients = torch.tensor([1.0, -0.4], dtype=DOUBLE)
+    angles = torch.linspace(0, 3.1, 40, dtype=DOUBLE)
+    p = 0.02 * module.directions(angles)
+    q = 0.03 * module.conjugate(p, coefficients)
+    assert (p * coefficients * q).sum(-1).abs().max() < 1e-18
+    values = module.energy_per_area(p, q, coefficients)
+    assert (values / (2 * coefficients.abs().sum()) > 1 - 1e-3).all()
+
+
+def test_handles_are_reached_and_energy_unfolds_the_gauss_image(run: Run, tmp_path: Path) -> None:
+    report = run("fig12_handles", "--weights", "0.03", "--samples", "32", "--lattices", "sheared")
+    assert report["counts"] == {"vertices": 189, "edges": 525, "faces": 336}  # those of the paper
+    without, with_energy = report["by_weight"]["sheared"]["0"], report["by_weight"]["sheared"]["0.03"]
+    for row in (without, with_energy):
+        assert row["largest_handle_distance"] < 1e-3
+        assert row["pyramids_beyond_a_half_sphere"] == 0
+    assert with_energy["normal_variation"] < 0.6 * without["normal_variation"]
+    assert with_energy["sum_of_dihedral_angles"] < 0.5 * without["sum_of_dihedral_angles"]
+    assert without["folded_pyramids"] > 10
+    assert with_energy["folded_pyramids"] == 0
+    assert load_mesh(tmp_path / "out" / "with_energy.obj").topology.num_faces == 336
+
+
+def test_pyramid_areas_differ_by_the_angle_defect(script: Callable[[str], ModuleType]) -> None:
+    module = script("fig12_handles")
+    vertices, topology = module.dome(module.Config(around=7, rings=4), 2.0, 0.3)
+    vertices = vertices + 0.06 * torch.from_numpy(np.random.default_rng(0).normal(size=vertices.shape))
+    positive, negative = module.pyramid_areas(vertices, topology, 200)
+    centres = torch.cat([centre for centre, _ in topology.rings_by_valence.values()])
+    assert torch.minimum(positive, negative).max() > 1e-3  # some are folded
+    torch.testing.assert_close(positive - negative, angle_defects(vertices, topology)[centres], atol=2e-3, rtol=0)
+
+
+@pytest.mark.parametrize(
+    ("arms", "bend", "is_folded"),
+    [
+        ([(1.0, 0.0), (0.5, 0.8), (-0.5, 0.8)], (1.0, 1.0), False),  # bowl
+        ([(1.0, 0.0), (0.5, 0.8), (-0.5, 0.8)], (1.0, -1.0), False),  # saddle
+        ([(1.2, 0.0), (2.2, 0.5), (1.0, 0.5)], (1.0, -1.0), True),  # paper Fig. 2c: K < 0, but all edges rise
+    ],
+)
+def test_pyramids_fold_where_the_star_of_a_saddle_is_none(
+    script: Callable[[str], ModuleType], arms: list[tuple[float, float]], bend: tuple[float, float], is_folded: bool
+) -> None:
+    ring = torch.tensor(arms + [(-x, -y) for x, y in arms], dtype=DOUBLE)
+    ring = torch.cat([ring, 0.2 * (ring**2 @ torch.tensor(bend, dtype=DOUBLE))[:, None]], dim=1)
+    vertices = torch.cat([torch.zeros(1, 3, dtype=DOUBLE), ring])
+    topology = Topology.from_faces([[0, i + 1, (i + 1) % 6 + 1] for i in range(6)])
+    areas = script("fig12_handles").pyramid_areas(vertices, topology, 200)
+    assert bool(torch.minimum(*areas) > 1e-3) == is_folded
+    assert torch.sign(angle_defects(vertices, topology)[0]) == torch.sign(torch.tensor(bend).prod())
+
+
+def test_hybrid_roof_gets_smoother_near_the_original_with_planar_quads(run: Run, tmp_path: Path) -> None:
+    report = run("fig18_hybrid_roof", "--strips", "3", "--columns", "8", "--iterations", "10")
+    for formulation in ("reduced", "lifted"):
+        row = report["formulations"][formulation]
+        assert row["relative_change"] < -0.03
+        assert row["after"]["largest_planarity"] < 1e-4
+        assert row["after"]["largest_distance_relative"] <= 0.05
+        assert row["after"]["flipped_faces"] == 0
+        mesh = load_mesh(tmp_path / "out" / f"{formulation}.obj")
+        assert planarity(mesh.vertices, mesh.topology).max() < 1e-4
+    assert report["formulations"]["lifted"]["unknowns"] > 3 * report["formulations"]["reduced"]["unknowns"]
+    sizes = report["sizes_as_in_paper"]
+    assert sizes["V"] - sizes["E"] + sizes["F"] == 1
+    assert "0.21" in (tmp_path / "out" / "table.txt").read_text()  # the paper's row
+
+
+TRAINING = ("--rows", "8", "--columns", "8", "--points", "120", "--batch", "60", "--steps", "90", "--log-every", "30")
+
+
+def test_training_with_energy_is_nearer_to_the_surface_and_smoother(run: Run, tmp_path: Path) -> None:
+    options = (*TRAINING, "--steps", "300", "--learning-rate", "0.02", "--noise", "0.1")
+    report = run("train_height_field", *options)
+    plain, regularised = report["plain"], report["regularised"]
+    assert regularised["best"]["error"] < 0.8 * plain["best"]["error"]
+    assert regularised["normal_variation"] < 0.5 * plain["normal_variation"]
+    lines = [json.loads(line) for line in (tmp_path / "out" / "plain.jsonl").read_text().splitlines()]
+    assert [line["step"] for line in lines] == list(range(30, 301, 30))
+    assert plain["best"] == min(lines, key=lambda line: line["validation"])
+
+
+# ---- programs ------------------------------------------------------------------------------------------
+
+
+def test_interrupted_training_keeps_the_best_and_resumes_to_the_same_numbers(
+    run: Run, script: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = run("train_height_field", *TRAINING, folder="whole")
+    module = script("train_height_field")
+    residuals, calls = module.Samples.residuals, []
+
+    def interrupting(self: object, *arguments: object) -> torch.Tensor:
+        calls.append(1)
+        if len(calls) == 50:  # in the second stretch of 30 steps
+            raise KeyboardInterrupt
+        return residuals(self, *arguments)
+
+    monkeypatch.setattr(module.Samples, "residuals", interrupting)
+    stopped = run("train_height_field", *TRAINING, code=130)
+    assert stopped["interrupted"]
+    assert stopped["regularised"]["best"]["step"] == 30
+    assert "plain" not in stopped
+    assert (tmp_path / "out" / "regularised.obj").exists()
+    monkeypatch.undo()
+    monkeypatch.syspath_prepend(str(FOLDER))
+    resumed = run("train_height_field", *TRAINING, "--resume")
+    for name in ("regularised", "plain"):
+        for key in ("best", "last"):
+            expected, actual = (dict(report[name][key], seconds=0) for report in (whole, resumed))
+            assert actual == expected
+    log = (tmp_path / "out" / "regularised.jsonl").read_text().splitlines()
+    assert [json.loads(line)["step"] for line in log] == [30, 60, 90]
+
+
+def test_a_checkpoint_of_other_settings_is_refused(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    run("train_height_field", *TRAINING, "--steps", "2", "--no-compare")
+    run("train_height_field", *TRAINING, "--steps", "2", "--no-compare", "--resume", "--noise", "0.2", code=2)
+    assert "other settings (noise)" in capsys.readouterr().err
+
+
+def test_results_are_not_replaced_without_force(run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--steps", "4", "--cells", "2")
+    run("fig11_energy_per_area", *options)
+    chart = tmp_path / "out" / "energy_per_area.png"
+    (tmp_path / "out" / "result.json").unlink()
+    written = chart.stat().st_mtime_ns
+    run("fig11_energy_per_area", *options, code=2)
+    captured = capsys.readouterr()
+    assert "--force" in captured.err
+    assert captured.err.count("\n") == 1
+    assert chart.stat().st_mtime_ns == written
+    assert run("fig11_energy_per_area", *options, "--force")["experiment"] == "fig11_energy_per_area"
+    assert chart.stat().st_mtime_ns != written
+
+
+@pytest.mark.parametrize("options", [("--rows", "7", "9"), ("--rows", "8"), ("--surfaces", "cube"), ("--seed", "-1")])
+def test_settings_out_of_bounds_are_refused(
+    script: Callable[[str], ModuleType], capsys: pytest.CaptureFixture[str], options: tuple[str, ...]
+) -> None:
+    with pytest.raises(SystemExit) as stop:
+        script("fig07_principal_meshes").main(list(options))
+    assert stop.value.code == 2
+    assert options[0].removeprefix("--") in capsys.readouterr().err
+
+
+def test_scripts_run_from_the_command_line() -> None:
+    command = [sys.executable, str(FOLDER / "fig18_hybrid_roof.py"), "--help"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "--strips" in done.stdout
+    assert "[13]" in done.stdout  # the default
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_readme_has_a_row_for_every_script(name: str) -> None:
+    assert f"`python experiments/{name}.py`" in (FOLDER / "README.md").read_text()
