@@ -11,8 +11,6 @@ from ...errors import SingularSystemError
 from ..system import Structure
 from .direct import SparseDirect, Substitution
 
-_SMALL = 2_000_000  # entries of the lower triangle below which one thread factors as fast as several
-
 
 class RslabDirect(SparseDirect):
     """Supernodal ``L D L^T`` (``pip install torchfair[direct]``); several times faster than SuperLU.
@@ -42,7 +40,7 @@ class RslabDirect(SparseDirect):
     def factorise(self, values: np.ndarray) -> Substitution:
         """See :class:`SparseDirect`."""
         try:
-            factor = self._symbolic.factor(values, threads=1 if values.size < _SMALL else None)
+            factor = self._symbolic.factor(values)
         except (RuntimeError, ValueError) as error:
             raise SingularSystemError(f"rslab: {error}") from None
         if factor.inertia[0] != self._size:
