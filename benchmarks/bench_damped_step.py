@@ -8,7 +8,7 @@ the steps, in milliseconds. Processor time beside wall time tells how busy the m
 one they agree, or wall time is the smaller where two threads work.
 
 =============  =========================================================================================
-Jacobian       residuals weighted, element Jacobians, gradient, damping scale
+Jacobian       residuals weighted, element Jacobians, gradient
 assembly       direct: the normal matrix; iterative: the stored Jacobian, its transpose, diagonal blocks
 factor, solve  direct: factorisation, then substitution; iterative: all inner iterations
 merit          residuals of the trial state (twice where the step is extrapolated)
@@ -108,7 +108,7 @@ class TimedDirect:
 
     def solve(self, system: LinearSystem, damping: Tensor, accuracy: float) -> Step:
         """One damped step."""
-        substitute = self._factorise(self._assemble(system, damping))
+        substitute = self._factorise(self._assemble(system, damping), accuracy)
         with self._clock.part("solve"):
             change = torch.from_numpy(substitute(-system.gradient.numpy())).to(system.gradient)
         return Step(change, torch.zeros_like(change))
@@ -171,7 +171,7 @@ class Case:
 
         def all_of_it(*arguments: object) -> LinearSystem:
             system = linearise(*arguments)
-            system.gradient, system.diagonal  # noqa: B018
+            system.gradient  # noqa: B018
             return system
 
         structure.linearise = self.clock.timed("jacobian", all_of_it)

@@ -178,9 +178,9 @@ class Iteration:
 
     def _scale(self, system: LinearSystem) -> Tensor:
         """Positive diagonal that the damping multiplies; one where nothing is felt."""
-        diagonal = system.diagonal
         if self.settings.damping_scale == "identity":
-            return torch.ones_like(diagonal)
+            return torch.ones_like(system.gradient)
+        diagonal = system.diagonal
         floor = 1e-12 * float(diagonal.max())
         floored = diagonal.clamp_min(floor if 0.0 < floor < math.inf else 1.0)
         return torch.where(diagonal > 0.0, floored, torch.ones_like(diagonal))

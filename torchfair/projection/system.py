@@ -114,9 +114,9 @@ class Structure:
         for compiled, free, arguments, values in zip(self.compiled, self._free, at.arguments, at.values, strict=True):
             root = compiled.term.scaled_weights(values.square().sum(1)).sqrt()
             residuals.append((values * root[:, None]).T)
-            local = compiled.term.jacobians(arguments) * root[:, None, None]
-            jacobian = local.permute(1, 2, 0).contiguous()
-            jacobians.append(jacobian if free is None else jacobian * free)
+            local = compiled.term.jacobians(arguments).permute(1, 2, 0)
+            jacobian = torch.mul(local, root, out=torch.empty_like(local, memory_format=torch.contiguous_format))
+            jacobians.append(jacobian if free is None else jacobian.mul_(free))
         return LinearSystem(self, jacobians, residuals, at.affine)
 
 
@@ -142,8 +142,7 @@ class LinearSystem:
     @cached_property
     def gradient(self) -> Tensor:
         """``J^T r``, the gradient of the merit."""
-        pairs = zip(self.jacobians, self.residuals, strict=True)
-        total = self.structure.scatter([(j * r[:, None]).sum(0) for j, r in pairs])
+        total = self.structure.scatter([_contract(j, r) for j, r in zip(self.jacobians, self.residuals, strict=True)])
         if self.structure.affine is not None and self.affine_residual is not None:
             total += self.structure.affine.gradient(self.affine_residual)
         return total
@@ -155,7 +154,7 @@ class LinearSystem:
         Used for scaling only: where an element names a node twice, the mixed products are left out, here
         and in :attr:`diagonal_blocks`.
         """
-        total = self.structure.scatter([j.square().sum(0) for j in self.jacobians])
+        total = self.structure.scatter([_contract(j, j) for j in self.jacobians])
         return total if self.structure.affine is None else total + self.structure.affine.diagonal
 
     @cached_property
@@ -188,3 +187,11 @@ class LinearSystem:
     def normal_values(self) -> Tensor:
         """Values of the lower triangle of ``J^T J`` in the order of the normal pattern."""
         return self.structure.normal_pattern.assemble(self.jacobians)
+
+
+def _contract(jacobian: Tensor, other: Tensor) -> Tensor:
+    """(K, n) sum over components of ``jacobian`` (m, K, n) times ``other`` (m, n) or (m, K, n)."""
+    total = jacobian[0] * other[0]
+    for row, factor in zip(jacobian[1:], other[1:], strict=True):
+        total.addcmul_(row, factor)
+    return total

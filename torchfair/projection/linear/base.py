@@ -14,7 +14,8 @@ class Step(NamedTuple):
 
     Attributes:
         change: (N,) the step d.
-        remainder: (N,) what is left, ``-J^T r - (J^T J + diag(damping)) d``; zero for direct solvers.
+        remainder: (N,) what is left, ``-J^T r - (J^T J + diag(damping)) d``; taken as zero by
+            direct solvers.
         iterations: inner iterations, 1 for direct solvers.
     """
 
@@ -28,7 +29,7 @@ class LinearSolver(Protocol):
 
     Attributes:
         name: For reports.
-        inexact: Whether :meth:`solve` heeds ``accuracy``.
+        inexact: Whether steps are only as accurate as asked for, so that it pays to start with rough ones.
     """
 
     name: str
@@ -44,7 +45,8 @@ class LinearSolver(Protocol):
         Args:
             system: Jacobians and residuals.
             damping: (N,) positive diagonal.
-            accuracy: Relative size of the remainder that is good enough; direct solvers ignore it.
+            accuracy: Relative size of the remainder that is good enough; direct solvers are
+                more accurate.
 
         Raises:
             SingularSystemError: the matrix is singular, indefinite or not finite.

@@ -28,8 +28,12 @@ class SparseDirect(ABC):
         """Symbolic work, once for each structure."""
 
     @abstractmethod
-    def factorise(self, values: np.ndarray) -> Substitution:
+    def factorise(self, values: np.ndarray, accuracy: float) -> Substitution:
         """Factors the lower triangle with ``values`` in the order of the normal pattern.
+
+        Args:
+            values: In double precision.
+            accuracy: Relative remainder of the solution that is good enough; smaller is always allowed.
 
         Returns:
             The map from a right-hand side to the solution.
@@ -48,7 +52,7 @@ class SparseDirect(ABC):
 
     def solve(self, system: LinearSystem, damping: Tensor, accuracy: float) -> Step:
         """One damped step; see the protocol."""
-        substitute = self.factorise(self.assemble(system, damping))
+        substitute = self.factorise(self.assemble(system, damping), accuracy)
         solution = substitute(-system.gradient.cpu().numpy().astype(np.float64))
         if not np.isfinite(solution).all():
             raise SingularSystemError("the normal matrix is singular to working precision")

@@ -24,7 +24,7 @@ class ScipyDirect(SparseDirect):
         self._pattern = structure.normal_pattern.full
         self._size = structure.num_unknowns
 
-    def factorise(self, values: np.ndarray) -> Substitution:
+    def factorise(self, values: np.ndarray, accuracy: float) -> Substitution:
         """See :class:`SparseDirect`."""
         from scipy.sparse.linalg import splu
 
