@@ -72,8 +72,8 @@ def naive_system(state: dict[str, Tensor], terms: list[ElementTerm], free: Tenso
                 value = term.residual(*local, *(data[i] for data in term.data)).reshape(-1)
                 weight = term.weight * (1.0 if term.element_weights is None else term.element_weights[i])
                 with torch.no_grad():
-                    weight = weight * term.loss.weight(value.square().sum())
-                rows.append(value * torch.as_tensor(weight).sqrt())
+                    root = term.loss.root(value[None])[0]
+                rows.append(torch.as_tensor(weight).sqrt() * (root @ value if root.ndim else root * value))
         return torch.cat(rows)
 
     jacobian = torch.autograd.functional.jacobian(everything, flat)

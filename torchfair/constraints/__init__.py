@@ -1,5 +1,6 @@
 """Ready-made terms for guided projection. Each file holds one idea: a stencil, an element residual, a weight."""
 
+from .absolute_curvature import absolute_curvature_terms as absolute_curvature_terms
 from .barrier import barrier as barrier
 from .closeness import closeness_terms as closeness_terms
 from .closeness import distance_limit_terms as distance_limit_terms

@@ -5,6 +5,9 @@ from .guided_projection import guided_projection as guided_projection
 from .loss import Loss as Loss
 from .loss import SmoothAbsolute as SmoothAbsolute
 from .loss import Squares as Squares
+from .nuclear_norm import SmoothNuclearNorm as SmoothNuclearNorm
+from .nuclear_norm import symmetric_components as symmetric_components
+from .nuclear_norm import symmetric_matrix as symmetric_matrix
 from .result import IterationRecord as IterationRecord
 from .result import ProjectionResult as ProjectionResult
 from .result import Status as Status

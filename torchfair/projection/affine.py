@@ -39,7 +39,7 @@ class AffinePart:
         matrices, offsets = [], []
         for compiled in terms:
             values, jacobians = compiled.term.derivatives(compiled.term.arguments(origin))
-            root = compiled.term.scaled_weights(values.square().sum(1)).sqrt()
+            root = compiled.term.roots(values)
             n, m, k = jacobians.shape
             entries = (jacobians * root[:, None, None]).cpu().numpy()
             columns = np.repeat(compiled.unknowns.T.cpu().numpy()[:, None], m, axis=1)
@@ -73,7 +73,7 @@ class AffinePart:
         scales = torch.split(torch.from_numpy(sizes), self._sizes)
         for term, mine, scale in zip(self._terms, torch.split(self.residual(flat), self._sizes), scales, strict=True):
             values = term.values(term.arguments(state))
-            own = (values * term.scaled_weights(values.square().sum(1)).sqrt()[:, None]).reshape(-1)
+            own = (values * term.roots(values)[:, None]).reshape(-1)
             if own.numel() and not float((own - mine).abs().max()) <= _TOLERANCE * float(scale.max()):
                 return term.name
         return None

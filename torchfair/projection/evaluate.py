@@ -8,6 +8,7 @@ import torch
 
 from ..errors import TorchfairError
 from .layout import State
+from .loss import apply_root
 from .result import TermResidual
 from .system import Evaluation, Structure
 from .term import ElementTerm
@@ -69,7 +70,7 @@ def culprit(structure: Structure, state: State) -> str:
     sizes = []
     for term in structure.terms:
         values, jacobians = term.derivatives(term.arguments(state))
-        scaled = jacobians * term.scaled_weights(values.square().sum(1)).sqrt()[:, None, None]
+        scaled = apply_root(term.roots(values), jacobians)
         sizes.append(float(torch.nan_to_num(scaled, nan=float("inf")).abs().max()))
     worst = max(range(len(sizes)), key=sizes.__getitem__)
     bad = first_bad_elements(structure.terms[worst], state)

@@ -1,4 +1,4 @@
-"""What a residual costs: squares, or a smoothed absolute value treated by iterative reweighting."""
+"""What a residual costs: squares, or a smoothed norm treated by iterative reweighting."""
 
 from __future__ import annotations
 
@@ -10,14 +10,22 @@ from torch import Tensor
 
 
 class Loss(Protocol):
-    """A concave function of the squared norm ``s = |r|^2`` of an element's residual."""
+    """What an element's residual costs, and the quadratic model of that cost.
 
-    def value(self, squared: Tensor) -> Tensor:
-        """Contribution to the merit."""
+    The model ``|root r|^2 / 2`` has the gradient of :meth:`value` where it is made and rises at least as
+    fast from there, so that a step which lowers the model lowers the merit.
+    """
+
+    def value(self, residuals: Tensor) -> Tensor:
+        """(n,) contributions to the merit of residuals ``(n, m)``, at least 0."""
         ...
 
-    def weight(self, squared: Tensor) -> Tensor:
-        """Twice the derivative of :meth:`value`: the weight of ``|r|^2 / 2`` in the quadratic model."""
+    def root(self, residuals: Tensor) -> Tensor:
+        """Square roots of the weights of the quadratic model made at residuals ``(n, m)``.
+
+        Returns:
+            (n,) numbers, or matrices (n, m, m) where components are weighted differently.
+        """
         ...
 
 
@@ -25,13 +33,13 @@ class Loss(Protocol):
 class Squares:
     """Least squares, ``|r|^2 / 2``."""
 
-    def value(self, squared: Tensor) -> Tensor:
+    def value(self, residuals: Tensor) -> Tensor:
         """Half the squared norm."""
-        return 0.5 * squared
+        return 0.5 * residuals.square().sum(1)
 
-    def weight(self, squared: Tensor) -> Tensor:
+    def root(self, residuals: Tensor) -> Tensor:
         """One."""
-        return torch.ones_like(squared)
+        return residuals.new_ones(residuals.shape[0])
 
 
 @dataclass(frozen=True)
@@ -45,10 +53,18 @@ class SmoothAbsolute:
 
     epsilon: float
 
-    def value(self, squared: Tensor) -> Tensor:
-        """``sqrt(s + epsilon^2) - epsilon``, evaluated without cancellation."""
+    def value(self, residuals: Tensor) -> Tensor:
+        """``sqrt(|r|^2 + epsilon^2) - epsilon``, evaluated without cancellation."""
+        squared = residuals.square().sum(1)
         return squared / (torch.sqrt(squared + self.epsilon**2) + self.epsilon)
 
-    def weight(self, squared: Tensor) -> Tensor:
-        """``1 / sqrt(s + epsilon^2)``."""
-        return torch.rsqrt(squared + self.epsilon**2)
+    def root(self, residuals: Tensor) -> Tensor:
+        """``(|r|^2 + epsilon^2)^(-1/4)``."""
+        return torch.rsqrt(torch.sqrt(residuals.square().sum(1) + self.epsilon**2))
+
+
+def apply_root(root: Tensor, values: Tensor) -> Tensor:
+    """Roots (n,) or (n, m, m) times residuals ``(n, m)`` or Jacobians ``(n, m, K)``."""
+    if root.ndim == 1:
+        return values * root.reshape(-1, *[1] * (values.ndim - 1))
+    return torch.einsum("nij,nj...->ni...", root, values)

@@ -13,6 +13,7 @@ from .affine import AffinePart
 from .block_diagonal import BlockDiagonal
 from .compiled import CompiledTerm
 from .layout import Layout, State
+from .loss import apply_root
 from .normal_pattern import NormalPattern
 from .row_pattern import RowPattern
 from .sparse import scatter_matrix
@@ -112,10 +113,9 @@ class Structure:
         at = state if isinstance(state, Evaluation) else self.evaluate(state)
         jacobians, residuals = [], []
         for compiled, free, arguments, values in zip(self.compiled, self._free, at.arguments, at.values, strict=True):
-            root = compiled.term.scaled_weights(values.square().sum(1)).sqrt()
-            residuals.append((values * root[:, None]).T)
-            local = compiled.term.jacobians(arguments).permute(1, 2, 0)
-            jacobian = torch.mul(local, root, out=torch.empty_like(local, memory_format=torch.contiguous_format))
+            root = compiled.term.roots(values)
+            residuals.append(apply_root(root, values).T)
+            jacobian = _scaled(compiled.term.jacobians(arguments), root)
             jacobians.append(jacobian if free is None else jacobian.mul_(free))
         return LinearSystem(self, jacobians, residuals, at.affine)
 
@@ -187,6 +187,14 @@ class LinearSystem:
     def normal_values(self) -> Tensor:
         """Values of the lower triangle of ``J^T J`` in the order of the normal pattern."""
         return self.structure.normal_pattern.assemble(self.jacobians)
+
+
+def _scaled(jacobians: Tensor, root: Tensor) -> Tensor:
+    """Jacobians (n, m, K) times their roots, as (m, K, n)."""
+    if root.ndim == 3:
+        return torch.einsum("nij,njk->ikn", root, jacobians).contiguous()
+    local = jacobians.permute(1, 2, 0)
+    return torch.mul(local, root, out=torch.empty_like(local, memory_format=torch.contiguous_format))
 
 
 def _contract(jacobian: Tensor, other: Tensor) -> Tensor:

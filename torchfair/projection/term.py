@@ -10,7 +10,7 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from .layout import Layout, State
-from .loss import Loss, Squares
+from .loss import Loss, Squares, apply_root
 
 Residual = Callable[..., Tensor]
 Refresh = Callable[[State], Sequence[Tensor]]
@@ -18,7 +18,7 @@ Refresh = Callable[[State], Sequence[Tensor]]
 
 @dataclass(frozen=True)
 class ElementTerm:
-    r"""A sum over elements of ``weight * element_weight * loss(|residual|^2)``.
+    r"""A sum over elements of ``weight * element_weight * loss(residual)``.
 
     Write :attr:`residual` for ONE element, in torch: it takes one tensor ``(k, d)`` for each entry of
     :attr:`stencil`, then one tensor for each entry of the data, and returns a scalar or ``(m,)``. The
@@ -37,7 +37,7 @@ class ElementTerm:
         data: Tensors ``(n, ...)`` handed to the residual element by element, constant for derivatives.
         weight: Dimensionless weight of the term, at least 0.
         element_weights: ``(n,)`` optional factors.
-        loss: :class:`Squares` or :class:`SmoothAbsolute`.
+        loss: :class:`Squares`, :class:`SmoothAbsolute`, or another :class:`Loss`.
         refresh: Called with every state that is evaluated; returns the ``data`` for that state (closest
             points, frozen directions). The merit is therefore a function of the state alone.
         merit: Element function with the same arguments that replaces the loss in the acceptance test, for
@@ -93,10 +93,13 @@ class ElementTerm:
         data = self.data if self.refresh is None else self.refresh(state)
         return (*local, *data)
 
-    def scaled_weights(self, squared: Tensor) -> Tensor:
-        """(n,) weight of ``|r|^2 / 2`` of every element in the quadratic model."""
-        weights = self.weight * self.loss.weight(squared)
-        return weights if self.element_weights is None else weights * self.element_weights
+    def roots(self, residuals: Tensor) -> Tensor:
+        """Square roots (n,) or (n, m, m) of all weights of the quadratic model made at residuals ``(n, m)``."""
+        root = self.loss.root(residuals)
+        weights = torch.full_like(residuals[:, 0], self.weight)
+        if self.element_weights is not None:
+            weights = weights * self.element_weights
+        return apply_root(weights.sqrt(), root)
 
     def values(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Residuals ``(n, m)``."""
@@ -104,11 +107,8 @@ class ElementTerm:
 
     def contributions(self, arguments: tuple[Tensor, ...], residuals: Tensor) -> Tensor:
         """(n,) merit of every element."""
-        if self.merit is not None:
-            value = torch.func.vmap(self.merit)(*arguments)
-        else:
-            value = self.loss.value(residuals.square().sum(1))
-        value = self.weight * value
+        own = self.loss.value(residuals) if self.merit is None else torch.func.vmap(self.merit)(*arguments)
+        value = self.weight * own
         return value if self.element_weights is None else value * self.element_weights
 
     def derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:

@@ -1,0 +1,71 @@
+"""The loss of matrices: a smoothed sum of absolute eigenvalues, treated by iterative reweighting."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class SmoothNuclearNorm:
+    r"""Smoothed nuclear norm ``sum_i sqrt(k_i^2 + epsilon^2) - epsilon`` of a symmetric 3x3 matrix.
+
+    The residual of an element is the matrix ``W`` as its six :func:`symmetric_components`; ``k_i`` are its
+    eigenvalues. The quadratic model ``tr(W (W_prev^2 + epsilon^2)^(-1/2) W) / 2`` lies above it and touches it
+    at ``W_prev`` (the trace of the square root is concave), so eigenvectors need not be differentiated:
+    the paper's weight iteration (section 5.3) for matrices.
+    """
+
+    epsilon: float
+
+    def value(self, residuals: Tensor) -> Tensor:
+        """Smoothed nuclear norms (n,), evaluated without cancellation."""
+        squared = torch.linalg.eigvalsh(symmetric_matrix(residuals)).square()
+        return (squared / (torch.sqrt(squared + self.epsilon**2) + self.epsilon)).sum(1)
+
+    def root(self, residuals: Tensor) -> Tensor:
+        """Roots (n, 6, 6): components in the eigenvectors, weighted by the mean of two inverse eigenvalues."""
+        values, vectors = torch.linalg.eigh(symmetric_matrix(residuals))
+        inverse = torch.rsqrt(values.square() + self.epsilon**2)
+        i, j = _pairs(residuals.device)
+        weights = torch.sqrt(0.5 * (inverse[:, i] + inverse[:, j]))
+        return weights[:, :, None] * _turned_basis(vectors)
+
+
+def symmetric_components(matrix: Tensor) -> Tensor:
+    """Six components (..., 6) of the symmetric part of matrices (..., 3, 3): the same norm, an isometry."""
+    i, j = _pairs(matrix.device)
+    both = 0.5 * (matrix + matrix.transpose(-1, -2))
+    return both[..., i, j] * _factors(matrix)
+
+
+def symmetric_matrix(components: Tensor) -> Tensor:
+    """Matrices (..., 3, 3) with the given :func:`symmetric_components`."""
+    i, j = _pairs(components.device)
+    matrix = components.new_zeros(*components.shape[:-1], 3, 3)
+    scaled = components / _factors(components)
+    matrix[..., i, j] = scaled
+    matrix[..., j, i] = scaled
+    return matrix
+
+
+def _pairs(device: torch.device) -> tuple[Tensor, Tensor]:
+    return (
+        torch.tensor([0, 1, 2, 1, 0, 0], device=device),
+        torch.tensor([0, 1, 2, 2, 2, 1], device=device),
+    )
+
+
+def _factors(like: Tensor) -> Tensor:
+    half = math.sqrt(2.0)
+    return like.new_tensor([1.0, 1.0, 1.0, half, half, half])
+
+
+def _turned_basis(vectors: Tensor) -> Tensor:
+    """(n, 6, 6) maps from components of W to those of ``U^T W U``."""
+    basis = symmetric_matrix(torch.eye(6, dtype=vectors.dtype, device=vectors.device))
+    turned = torch.einsum("nai,cab,nbj->ncij", vectors, basis, vectors)
+    return symmetric_components(turned).transpose(1, 2)
