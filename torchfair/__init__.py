@@ -7,6 +7,8 @@ The parts are imported by name: ``torchfair.geometry``, ``torchfair.energies``, 
 from .energies import AngleVariation as AngleVariation
 from .energies import NormalVariation as NormalVariation
 from .energies import PolylineFairness as PolylineFairness
+from .energies import TotalAbsoluteCurvature as TotalAbsoluteCurvature
+from .energies import TotalFrobeniusCurvature as TotalFrobeniusCurvature
 from .energies import TotalMeanCurvature as TotalMeanCurvature
 from .energies import UmbrellaFairness as UmbrellaFairness
 from .errors import MeshError as MeshError

@@ -7,6 +7,7 @@ import io
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import hypothesis.strategies as st
 import pytest
@@ -51,6 +52,20 @@ ENERGIES = {
     ),
     "polyline_fairness": Energy(
         energies.PolylineFairness, energies.polyline_fairness, energies.polyline_fairness_per_triple, "per_triple", 2
+    ),
+    "total_absolute_curvature": Energy(
+        energies.TotalAbsoluteCurvature,
+        energies.total_absolute_curvature,
+        energies.total_absolute_curvature_per_vertex,
+        "per_vertex",
+        1,
+    ),
+    "total_frobenius_curvature, corrected and extrapolated": Energy(
+        partial(energies.TotalFrobeniusCurvature, estimator="corrected", boundary="extrapolated"),
+        partial(energies.total_frobenius_curvature, estimator="corrected", boundary="extrapolated"),
+        partial(energies.total_frobenius_curvature_per_vertex, estimator="corrected", boundary="extrapolated"),
+        "per_vertex",
+        1,
     ),
 }
 every_energy = pytest.mark.parametrize("energy", ENERGIES.values(), ids=ENERGIES.keys())

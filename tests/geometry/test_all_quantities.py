@@ -48,6 +48,16 @@ QUANTITIES = {
     "shape_operators_angle": Quantity(
         lambda vertices, topology: geometry.shape_operators(vertices, topology, sine=False), "vertex", 1, 2, odd=True
     ),
+    "corrected_shape_operators": Quantity(geometry.corrected_shape_operators, "vertex", 1, rank=2, odd=True),
+    "nuclear_norms": Quantity(
+        lambda vertices, t: geometry.nuclear_norms(geometry.tangential_shape_operators(vertices, t)), "vertex", 1
+    ),
+    "frobenius_norms": Quantity(
+        lambda vertices, t: geometry.frobenius_norms(geometry.tangential_shape_operators(vertices, t)), "vertex", 1
+    ),
+    "star_normals": Quantity(geometry.star_normals, "vertex", 0, rank=1, odd=True),
+    "balanced_normals": Quantity(geometry.balanced_normals, "vertex", 0, rank=1, odd=True),
+    "vertex_areas": Quantity(geometry.vertex_areas, "vertex", 2),
     "gauss_image": Quantity(lambda vertices, t: geometry.gauss_image(vertices, t).points, "face", 0, rank=1, odd=True),
     "umbrella_vectors": Quantity(geometry.umbrella_vectors, "vertex", 1, rank=1),
 }
