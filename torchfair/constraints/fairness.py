@@ -5,14 +5,22 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from ..geometry import vertex_normals
 from ..polylines import straight_triples
 from ..projection import ElementTerm
+from ..projection.layout import State
 from ..topology import Topology
 
 
 def umbrella(x: Tensor) -> Tensor:
     """Mean of the neighbours ``x[1:]`` minus the vertex ``x[0]`` (Kobbelt et al. 1998)."""
     return x[1:].mean(0) - x[0]
+
+
+def tangential_umbrella(x: Tensor, normal: Tensor) -> Tensor:
+    """:func:`umbrella` without its part along the unit ``normal``."""
+    vector = umbrella(x)
+    return vector - torch.dot(vector, normal) * normal
 
 
 def second_difference(x: Tensor) -> Tensor:
@@ -45,6 +53,22 @@ def boundary_fairness_terms(
     if not triples.numel():
         return []
     return [ElementTerm("boundary fairness", second_difference, [(block, triples)], weight=weight, linear=True)]
+
+
+def tangential_fairness_terms(topology: Topology, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
+    """Umbrella vectors of interior vertices projected to the tangent planes: spreads vertices, bends nothing.
+
+    The tangent plane is that of the vertex normal, refreshed at every state.
+    """
+    terms = []
+    for centres, ring in topology.rings_by_valence.values():
+
+        def refresh(state: State, centres: Tensor = centres) -> tuple[Tensor]:
+            return (vertex_normals(state[block], topology)[centres],)
+
+        stencil = [(block, torch.cat([centres[:, None], ring], dim=1))]
+        terms.append(ElementTerm("tangential fairness", tangential_umbrella, stencil, weight=weight, refresh=refresh))
+    return terms
 
 
 def _between_quads(topology: Topology) -> Tensor:

@@ -1,5 +1,9 @@
 """Formfinding jobs: short recipes over energies, constraints and guided projection (paper section 5)."""
 
+from .absolute_curvature import FormResult as FormResult
+from .absolute_curvature import minimise_absolute_curvature as minimise_absolute_curvature
+from .form_settings import FormSettings as FormSettings
 from .normal_variation import FairResult as FairResult
 from .normal_variation import minimise_normal_variation as minimise_normal_variation
 from .settings import FairSettings as FairSettings
+from .start_surface import start_surface as start_surface

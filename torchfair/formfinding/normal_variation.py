@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ..energies import normal_variation
-from ..errors import MeshError, ShapeError
+from ..errors import ShapeError
 from ..projection import ProjectionResult, Status, guided_projection
 from ..projection.iteration import Callback
 from ..projection.layout import State
@@ -17,6 +17,7 @@ from ..projection.normalisation import Normalisation
 from ..topology import Topology
 from .fair_problem import FairProblem
 from .fair_report import fair_measures
+from .handles import read_handles
 from .settings import FairSettings
 
 Mesh = tuple[Tensor, Topology]
@@ -87,13 +88,14 @@ def minimise_normal_variation(
     start = vertices.detach().to("cpu", torch.float64)
     topology = topology.to("cpu")
     normalisation = Normalisation.of(start, topology)
+    pulled, targets = read_handles(handles or {}, topology)
     problem = FairProblem(
         normalisation.apply(start),
         topology,
         None
         if reference is None
         else (normalisation.apply(reference[0].detach().to("cpu", torch.float64)), reference[1]),
-        _targets(handles or {}, topology, normalisation),
+        dict(zip(pulled.tolist(), normalisation.apply(targets), strict=True)),
         settings,
     )
 
@@ -134,17 +136,3 @@ def minimise_normal_variation(
         after=after,
         notes=problem.notes,
     )
-
-
-def _targets(
-    handles: Mapping[int, Sequence[float]], topology: Topology, normalisation: Normalisation
-) -> dict[int, Tensor]:
-    targets = {}
-    for vertex, target in handles.items():
-        point = torch.as_tensor(target, dtype=torch.float64)
-        if point.shape != (3,) or not bool(torch.isfinite(point).all()):
-            raise ShapeError(f"handle {vertex}", "three finite coordinates", target)
-        if not 0 <= vertex < topology.num_vertices:
-            raise MeshError(f"handle {vertex} is no vertex: numbers run from 0 to {topology.num_vertices - 1}")
-        targets[vertex] = normalisation.apply(point)
-    return targets

@@ -24,7 +24,8 @@ class SmoothNuclearNorm:
     def value(self, residuals: Tensor) -> Tensor:
         """Smoothed nuclear norms (n,), evaluated without cancellation."""
         squared = torch.linalg.eigvalsh(symmetric_matrix(residuals)).square()
-        return (squared / (torch.sqrt(squared + self.epsilon**2) + self.epsilon)).sum(1)
+        value: Tensor = (squared / (torch.sqrt(squared + self.epsilon**2) + self.epsilon)).sum(1)
+        return value
 
     def root(self, residuals: Tensor) -> Tensor:
         """Roots (n, 6, 6): components in the eigenvectors, weighted by the mean of two inverse eigenvalues."""

@@ -14,7 +14,7 @@ from ..topology import Topology
 from .camera import Camera
 from .lines import EdgeStyle, Surface, visible_lines
 from .rasterise import interpolate, visible_triangles
-from .triangulate import Triangulation, triangulate
+from ..triangulation import Triangulation, triangulate
 
 Color = tuple[float, float, float]
 

@@ -1,4 +1,4 @@
-"""Cuts polygons into triangles, for drawing only."""
+"""Cuts polygons into triangles without new vertices."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from ..topology import Topology
+from .topology import Topology
 
 
 class Triangulation(NamedTuple):
@@ -26,7 +26,7 @@ def triangulate(vertices: Tensor, topology: Topology) -> Triangulation:
     """Fans of triangles over the faces, one mesh ``(V, 3)``.
 
     Each polygon is fanned from the corner whose smallest triangle is the largest, measured along the area vector
-    of the polygon. That draws every polygon exactly which is convex or star-shaped from one of its corners, so
+    of the polygon. That covers every polygon exactly which is convex or star-shaped from one of its corners, so
     every planar quad, and splits a quad that is not planar the same way wherever it is seen from.
     """
     triangles, faces = [], []

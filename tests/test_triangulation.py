@@ -5,7 +5,7 @@ from helpers import DOUBLE, cube, tetrahedron, wavy_grid
 
 from torchfair import Topology
 from torchfair.geometry import face_area_vectors
-from torchfair.viewing.triangulate import triangulate
+from torchfair.triangulation import triangulate
 
 
 def summed_areas(vertices: torch.Tensor, topology: Topology) -> torch.Tensor:

@@ -1,0 +1,129 @@
+"""The terms and fixed vertices of the job that lowers C, on one level of refinement."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from .. import constraints as c
+from ..constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks, lifted_absolute_curvature_terms
+from ..energies import total_absolute_curvature
+from ..geometry import face_normals, vertex_normals
+from ..geometry.closest_curve_point import ReferenceCurves
+from ..projection import ElementTerm
+from ..projection.layout import State
+from ..projection.normalisation import Normalisation
+from ..topology import Topology
+from .boundary_track import BoundaryTrack
+from .form_settings import FormSettings
+
+_LEAST_SMOOTHING = 1e-4  # mean edge lengths: where a flat start has nothing to measure it by
+
+
+class FormProblem:
+    """Everything guided projection needs to lower C of one triangle mesh.
+
+    Args:
+        topology: Triangle mesh.
+        normalisation: To unit mean edge length.
+        track: Boundary vertices and their curves, in units of the input.
+        normals: (V, 3) prescribed unit normals of boundary vertices; zero where none is.
+        handles: (n,) vertices that are pulled.
+        targets: (n, 3) where to, normalised.
+        settings: Weights.
+
+    Attributes:
+        fixed: (V,) bool.
+    """
+
+    def __init__(
+        self,
+        topology: Topology,
+        normalisation: Normalisation,
+        track: BoundaryTrack,
+        normals: Tensor,
+        handles: Tensor,
+        targets: Tensor,
+        settings: FormSettings,
+    ) -> None:
+        self.topology, self.settings = topology, settings
+        self.handles, self.targets = handles, targets
+        gliding = settings.boundary == "glide"
+        stays = topology.is_boundary_vertex & (track.corners | (not gliding))
+        self.fixed = stays | (topology.valences == 0)
+        self._fairness = [
+            *c.interior_fairness_terms(topology, weight=settings.fairness_weight),
+            *c.handle_terms(handles, targets, weight=settings.handle_weight),
+            *self._tangent_planes(normals),
+        ]
+        self._in_space = [*self._gliding(track, normalisation)] if gliding else []
+        if settings.tangential_fairness_weight:
+            self._in_space += c.tangential_fairness_terms(topology, weight=settings.tangential_fairness_weight)
+
+    def smoothing(self, vertices: Tensor, fraction: float) -> float:
+        """Smoothing that is the given fraction of the mean absolute curvature of a star."""
+        mean = float(total_absolute_curvature(vertices, self.topology)) / max(1, self.topology.num_vertices)
+        return max(fraction * mean, _LEAST_SMOOTHING)
+
+    # ---- vertices move along normals -------------------------------------------------------------------
+
+    def directions(self, vertices: Tensor) -> Tensor:
+        """(V, 3) vertex normals; towards their targets at handles."""
+        ways = vertex_normals(vertices, self.topology)
+        pull = self.targets - vertices[self.handles]
+        length = torch.linalg.vector_norm(pull, dim=1, keepdim=True)
+        ways[self.handles] = torch.where(length > 0.0, pull / length, ways[self.handles])
+        return ways
+
+    def height_terms(self, vertices: Tensor, directions: Tensor, smoothing: float) -> list[ElementTerm]:
+        """Terms whose unknowns are heights along the directions; the boundary stays."""
+        terms = [*self._curvature(smoothing), *self._fairness]
+        return [c.along_directions(term, vertices, directions) for term in terms]
+
+    # ---- vertices move in space ------------------------------------------------------------------------
+
+    def blocks(self, vertices: Tensor) -> dict[str, Tensor]:
+        """Variable blocks at ``vertices``."""
+        if self.settings.formulation == "reduced":
+            return {"vertices": vertices}
+        return lifted_absolute_curvature_blocks(vertices, self.topology)
+
+    def terms(self, smoothing: float) -> list[ElementTerm]:
+        """Terms whose unknowns are the vertices, or those of the lifted formulation."""
+        settings = self.settings
+        if settings.formulation == "reduced":
+            return [*self._curvature(smoothing), *self._fairness, *self._in_space]
+        lifted = lifted_absolute_curvature_terms(
+            self.topology,
+            smoothing=smoothing,
+            weight=settings.curvature_weight,
+            constraint_weight=settings.constraint_weight,
+        )
+        return [*lifted, *self._fairness, *self._in_space]
+
+    def keeps_faces(self, state: State, trial: State) -> bool:
+        """Whether no face turns over in a step."""
+        before = face_normals(state["vertices"], self.topology)
+        after = face_normals(trial["vertices"], self.topology)
+        return bool(((before * after).sum(1) > 0.0).all())
+
+    # ---- terms -----------------------------------------------------------------------------------------
+
+    def _curvature(self, smoothing: float) -> list[ElementTerm]:
+        return c.absolute_curvature_terms(self.topology, smoothing=smoothing, weight=self.settings.curvature_weight)
+
+    def _tangent_planes(self, normals: Tensor) -> list[ElementTerm]:
+        chosen = torch.nonzero((normals != 0.0).any(1) & self.topology.is_boundary_vertex).squeeze(1)
+        return c.tangent_plane_terms(self.topology, chosen, normals[chosen], weight=self.settings.tangent_weight)
+
+    def _gliding(self, track: BoundaryTrack, normalisation: Normalisation) -> list[ElementTerm]:
+        lines, closed = track.polylines()
+        if not lines:
+            return []
+        vertices = torch.nonzero(self.topology.is_boundary_vertex & ~track.corners).squeeze(1)
+        curves = ReferenceCurves([normalisation.apply(line) for line in lines], closed)
+        settings = self.settings
+        return [
+            *c.gliding_terms(curves, vertices, track.pieces(vertices), weight=settings.boundary_weight),
+            *c.boundary_fairness_terms(self.topology, track.corners, weight=settings.fairness_weight),
+        ]

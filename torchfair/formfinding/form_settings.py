@@ -1,0 +1,75 @@
+"""Settings of the formfinding job that lowers C."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from ..projection import ProjectionSettings
+
+BOUNDARIES = ("fixed", "glide")
+FORMULATIONS = ("reduced", "lifted")
+
+
+def _default_projection() -> ProjectionSettings:
+    return ProjectionSettings(
+        max_iterations=20, initial_damping=1e-2, damping_scale="identity", merit_tolerance=1e-3, patience=2
+    )
+
+
+@dataclass(frozen=True)
+class FormSettings:
+    """What :func:`minimise_absolute_curvature` trades against what.
+
+    Weights are dimensionless: the problem is solved with unit mean edge length.
+
+    Attributes:
+        curvature_weight: Weight of C.
+        fairness_weight: Weight of squared umbrella vectors: keeps stars from crumpling, fades as edges shorten.
+        tangential_fairness_weight: Weight of their parts in the tangent planes, on top.
+        boundary: ``"fixed"``, or ``"glide"`` to let boundary vertices slide along the boundary curves, corners
+            kept.
+        boundary_weight: Weight of the squared distance of gliding vertices from their curve.
+        corner_angle: The boundary has a corner where it turns by more than this, radians.
+        tangent_weight: Weight of the squared angle between prescribed and actual normals, radians.
+        handle_weight: Weight of the squared distance of handles from their targets.
+        coarse_smoothing, smoothing: Stars with less curvature than this fraction of the mean over all stars
+            are treated as flat, at first and in the end; in between, by steps of about five.
+        formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables
+            too (for comparison: slower).
+        constraint_weight: Weight of the constraints that define auxiliary variables.
+        projection: Iterations of each stage, tolerances, damping and linear solver.
+    """
+
+    curvature_weight: float = 1.0
+    fairness_weight: float = 1.0
+    tangential_fairness_weight: float = 0.0
+    boundary: str = "fixed"
+    boundary_weight: float = 1e4
+    corner_angle: float = math.radians(40.0)
+    tangent_weight: float = 1e4
+    handle_weight: float = 1e4
+    coarse_smoothing: float = 1.5
+    smoothing: float = 0.05
+    formulation: str = "reduced"
+    constraint_weight: float = 1e4
+    projection: ProjectionSettings = field(default_factory=_default_projection)
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("boundary", BOUNDARIES), ("formulation", FORMULATIONS)):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+        if not 0.0 < self.smoothing <= self.coarse_smoothing < math.inf:
+            raise ValueError(
+                f"smoothing must be positive and at most coarse_smoothing, got {self.smoothing} and "
+                f"{self.coarse_smoothing}"
+            )
+        weights = [name for name in vars(self) if name.endswith("_weight") and not getattr(self, name) >= 0.0]
+        if weights:
+            raise ValueError(f"weights must be at least 0: {', '.join(weights)}")
+
+    def smoothings(self) -> list[float]:
+        """From coarse to fine, in geometric steps of about five."""
+        steps = max(1, round(math.log(self.coarse_smoothing / self.smoothing, 5.0)))
+        ratio = (self.smoothing / self.coarse_smoothing) ** (1.0 / steps)
+        return [self.coarse_smoothing * ratio**i for i in range(steps)] + [self.smoothing]

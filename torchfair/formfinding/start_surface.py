@@ -1,0 +1,138 @@
+"""Start surfaces from boundary curves alone: a disk in one curve, an annulus between two."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..curves import ClosedCurve
+from ..errors import MeshError
+from ..topology import Topology
+
+_TURNS = 360  # places of the second curve that are tried against the first
+
+
+def start_surface(curves: Sequence[ClosedCurve], count: int = 1000) -> tuple[Tensor, Topology]:
+    """A triangle mesh of about ``count`` vertices between given boundary curves.
+
+    One curve: a disk of triangles around a centre, all inner vertices of valence 6, each in the mean of its
+    neighbours. Two curves: an annulus of staggered rows on the straight lines between them, which start where the
+    lines are shortest; the second curve may run either way round. Boundary vertices are evenly spaced, corners
+    among them.
+
+    Args:
+        curves: One or two closed curves.
+        count: Wanted number of vertices.
+
+    Returns:
+        vertices (V, 3) float64, topology. Faces run counterclockwise with the first curve, so normals of a disk
+        point to where that is seen to run counterclockwise.
+
+    Raises:
+        MeshError: another number of curves, a count below 7, or too many corners for it.
+    """
+    if count < 7:
+        raise MeshError(f"a start surface needs at least 7 vertices, got count = {count}")
+    if len(curves) == 1:
+        return _disk(curves[0], count)
+    if len(curves) == 2:
+        return _annulus(curves[0], curves[1], count)
+    raise MeshError(f"a start surface is made from one curve (disk) or two (annulus), got {len(curves)}: give a mesh")
+
+
+def _disk(curve: ClosedCurve, count: int) -> tuple[Tensor, Topology]:
+    rings = max(1, round((math.sqrt(12.0 * count - 3.0) - 3.0) / 6.0))  # 1 + 3 n (n + 1) vertices
+    while 6 * rings < len(curve.corners):
+        rings += 1
+    topology = Topology.from_faces(_hexagon(rings))
+    vertices = torch.zeros(topology.num_vertices, 3, dtype=torch.float64)
+    edge = topology.num_vertices - 6 * rings
+    vertices[edge:] = curve.at(curve.spaced(6 * rings))
+    return _harmonic(vertices, topology), topology
+
+
+def _hexagon(rings: int) -> np.ndarray:
+    """Triangles (F, 3) of a hexagon of the triangular lattice; ring j holds 6 j vertices, the outermost last."""
+    faces = []
+    first = [0, *(1 + 3 * j * (j - 1) for j in range(1, rings + 1))]
+    for j in range(1, rings + 1):
+        inner, outer = first[j - 1], first[j]
+        inside, outside = max(6 * (j - 1), 1), 6 * j
+        side, step = np.divmod(np.arange(outside), j)
+        below = inner + (side * (j - 1) + np.minimum(step, j - 1)) % inside
+        here, following = outer + np.arange(outside), outer + (np.arange(outside) + 1) % outside
+        faces.append(np.stack([below, here, following], 1))
+        if j > 1:
+            side, step = np.divmod(np.arange(inside), j - 1)
+            ahead = outer + side * j + step + 1
+            faces.append(np.stack([inner + np.arange(inside), ahead, inner + (np.arange(inside) + 1) % inside], 1))
+    return np.concatenate(faces)
+
+
+def _annulus(first: ClosedCurve, second: ClosedCurve, count: int) -> tuple[Tensor, Topology]:
+    around = 0.5 * (first.length + second.length)
+    bottom, top = _matched(first, second, _TURNS)
+    width = float((first.at(bottom) - second.at(top)).norm(dim=1).mean())
+    edge = math.sqrt(around * width / count * 2.0 / math.sqrt(3.0))
+    columns = max(6, len(first.corners), len(second.corners), round(around / edge))
+    rows = max(2, 2 * round(0.5 * (count / columns - 1.0)))  # even, so that neither curve has a shifted row
+    bottom, top = _matched(first, second, columns)
+    places = []
+    for row in range(rows + 1):
+        shift = 0.5 * (row % 2)
+        ends = (first.at(_between(bottom, shift)), second.at(_between(top, shift)))
+        places.append(ends[0].lerp(ends[1], row / rows))
+    return torch.cat(places), Topology.from_faces(_rows(rows, columns))
+
+
+def _matched(first: ClosedCurve, second: ClosedCurve, count: int) -> tuple[Tensor, Tensor]:
+    """Parameters (count,) on both curves, of either direction on the second, that lie as near as possible."""
+    bottom, top = first.spaced(count), second.spaced(count)
+    points, best, nearest = first.at(bottom), top, math.inf
+    for candidate in (top, top.flip(0)):
+        places = second.at(candidate)
+        gaps = [float((points - places.roll(shift, 0)).square().sum()) for shift in range(count)]
+        if min(gaps) < nearest:
+            nearest, best = min(gaps), candidate.roll(int(np.argmin(gaps)), 0)
+    return bottom, best
+
+
+def _between(parameters: Tensor, shift: float) -> Tensor:
+    """Parameters shifted by a fraction of the way to the next ones, around the circle."""
+    ahead = torch.remainder(parameters.roll(-1, 0) - parameters + 0.5, 1.0) - 0.5
+    return parameters + shift * ahead
+
+
+def _rows(rows: int, columns: int) -> np.ndarray:
+    """Triangles between rows, of which every second one is shifted by half a cell."""
+    i = np.arange(columns)
+    after = (i + 1) % columns
+    faces = []
+    for row in range(rows):
+        a, b = row * columns + i, row * columns + after
+        c, d = a + columns, b + columns
+        pairs = ((a, b, c), (b, d, c)) if row % 2 == 0 else ((a, b, d), (a, d, c))
+        faces += [np.stack(triangle, 1) for triangle in pairs]
+    return np.concatenate(faces)
+
+
+def _harmonic(vertices: Tensor, topology: Topology) -> Tensor:
+    """Puts every inner vertex in the mean of its neighbours; boundary vertices stay."""
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import splu
+
+    v, w = topology.edges.numpy().T
+    size = topology.num_vertices
+    graph = sp.coo_matrix((np.ones(v.size), (v, w)), (size, size)).tocsr()
+    laplacian = sp.diags(topology.valences.numpy().astype(float)) - graph - graph.T
+    free = np.flatnonzero(~topology.is_boundary_vertex.numpy())
+    held = np.flatnonzero(topology.is_boundary_vertex.numpy())
+    rows = sp.csr_matrix(laplacian)[free]
+    inner = splu(sp.csc_matrix(rows[:, free])).solve(-(rows[:, held] @ vertices[held].numpy()))
+    result = vertices.clone()
+    result[free] = torch.from_numpy(inner)
+    return result
