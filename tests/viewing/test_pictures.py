@@ -14,12 +14,13 @@ from PIL import Image
 from torchfair import MeshFileError, ShapeError, Topology
 from torchfair.viewing import (
     picture_before_after,
+    picture_curvature,
     picture_edges,
     picture_gauss_images,
     picture_mesh,
     view_direction,
 )
-from torchfair.viewing.picture_edges import map_colors
+from torchfair.viewing.color_scale import ColorScale
 
 Mesh = tuple[torch.Tensor, Topology]
 Picture = Callable[..., tuple[int, int]]
@@ -41,7 +42,12 @@ def gauss_picture(path: Path, vertices: torch.Tensor, topology: Topology, **opti
     return picture_gauss_images(path, vertices, 1.1 * vertices, topology, width=400, **options)
 
 
-PICTURES = [mesh_picture, before_after, edges_picture, gauss_picture]
+def curvature_picture(path: Path, vertices: torch.Tensor, topology: Topology, **options: object) -> tuple[int, int]:
+    meshes = [("one", vertices, topology), ("two", 1.1 * vertices, topology)]
+    return picture_curvature(path, meshes, width=500, **options)
+
+
+PICTURES = [mesh_picture, before_after, edges_picture, gauss_picture, curvature_picture]
 MESHES = {
     "quads": wavy_grid(),
     "float32": (wavy_grid(triangles=True)[0].float(), wavy_grid(triangles=True)[1]),
@@ -156,10 +162,11 @@ def test_view_can_be_chosen(tmp_path: Path) -> None:
 
 
 def test_edge_colours_run_from_light_to_dark_and_stop_at_the_end() -> None:
-    colors = map_colors(torch.linspace(0, 1, 50))
+    scale = ColorScale("", 1.0, False, "magma_r", 0.04)
+    colors = scale.colors(torch.linspace(0, 1, 50))
     luminance = colors @ torch.tensor([0.2126, 0.7152, 0.0722])
     assert bool((luminance.diff() < 0).all())
-    assert torch.equal(map_colors(torch.tensor([1.0, 7.0, torch.inf])), colors[-1:].expand(3, 3))
+    assert torch.equal(scale.colors(torch.tensor([1.0, 7.0, torch.inf])), colors[-1:].expand(3, 3))
 
 
 def test_meshes_of_different_connectivity_share_a_picture(tmp_path: Path) -> None:

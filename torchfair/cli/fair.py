@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from .arguments import non_negative, positive_count, positive_or_none, vertex_target
 from .errors import CommandError
-from .fair_outputs import Outputs
+from .fair_outputs import PICTURES, FairOutputs
 from .inputs import read_input
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Checks everything that can be checked first, then solves, then writes."""
-    outputs = Outputs(Path(arguments.output), arguments.results, pictures=not arguments.no_pictures)
+    outputs = FairOutputs(Path(arguments.output), arguments.results, () if arguments.no_pictures else PICTURES)
     outputs.check(force=arguments.force)
     mesh = read_input(arguments.input, arguments.repair)
     reference = read_input(arguments.reference, arguments.repair) if arguments.reference else None

@@ -3,50 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import CommandError
+from .outputs import Outputs
 
 if TYPE_CHECKING:
     from ..formfinding import FairResult, FairSettings
     from ..io import PolygonMesh
 
-_MESH_FORMATS = (".obj", ".off", ".ply")
+PICTURES = ("before_after.png", "edges.png", "gauss_images.png")
 
 
-class Outputs:
-    """Mesh, report and pictures; each is written whole or not at all.
-
-    Args:
-        mesh: The mesh file.
-        folder: Where report and pictures go; by default the folder of the mesh.
-        pictures: Whether there are pictures.
-    """
-
-    def __init__(self, mesh: Path, folder: str | None, *, pictures: bool) -> None:
-        self.mesh = mesh
-        self.folder = mesh.parent if folder is None else Path(folder)
-        self.report = self.folder / "report.json"
-        names = ("before_after.png", "edges.png", "gauss_images.png") if pictures else ()
-        self.pictures = [self.folder / name for name in names]
-
-    def paths(self) -> list[Path]:
-        """All files, the mesh first."""
-        return [self.mesh, self.report, *self.pictures]
-
-    def check(self, *, force: bool) -> None:
-        """Refuses unknown mesh formats and, without ``force``, files that exist."""
-        if self.mesh.suffix.lower() not in _MESH_FORMATS:
-            raise CommandError(f"cannot write '{self.mesh}': choose a name that ends in {', '.join(_MESH_FORMATS)}")
-        existing = [str(path) for path in self.paths() if path.exists()]
-        if existing and not force:
-            raise CommandError(f"{', '.join(existing)} exists: choose another folder, or --force to replace")
-
-    def make_folders(self) -> None:
-        """Makes the folders of all files, so that a solve does not end with nowhere to write."""
-        for folder in {self.mesh.parent, self.folder}:
-            folder.mkdir(parents=True, exist_ok=True)
+class FairOutputs(Outputs):
+    """What ``torchfair fair`` writes."""
 
     def write(
         self, mesh: PolygonMesh, result: FairResult, settings: FairSettings, arguments: argparse.Namespace

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _REFRESH = 0.1  # seconds between repaints of a terminal
 _BAR = 20  # columns
 _PLAIN_LINES = 20  # wanted number of plain lines
-_SYMBOLS = {"normal_variation": "E", "angle_variation": "E'"}
+_SYMBOLS = {"normal_variation": "E", "angle_variation": "E'", "total_absolute_curvature": "C"}
 
 
 class Record(Protocol):

@@ -5,5 +5,6 @@ from .absolute_curvature import minimise_absolute_curvature as minimise_absolute
 from .form_settings import FormSettings as FormSettings
 from .normal_variation import FairResult as FairResult
 from .normal_variation import minimise_normal_variation as minimise_normal_variation
+from .prescribed_normals import prescribed_normals as prescribed_normals
 from .settings import FairSettings as FairSettings
 from .start_surface import start_surface as start_surface

@@ -53,6 +53,11 @@ class FormResult:
         """The last stage."""
         return self.stages[-1]
 
+    @property
+    def message(self) -> str:
+        """Why the last stage ended."""
+        return self.projection.message
+
 
 def minimise_absolute_curvature(
     vertices: Tensor,

@@ -86,7 +86,7 @@ class FormProblem:
         """Variable blocks at ``vertices``."""
         if self.settings.formulation == "reduced":
             return {"vertices": vertices}
-        return lifted_absolute_curvature_blocks(vertices, self.topology)
+        return {"vertices": vertices, **lifted_absolute_curvature_blocks(vertices, self.topology)}
 
     def terms(self, smoothing: float) -> list[ElementTerm]:
         """Terms whose unknowns are the vertices, or those of the lifted formulation."""

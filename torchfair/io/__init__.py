@@ -7,6 +7,8 @@ only then.
 
 from .atomic import atomic_write_bytes as atomic_write_bytes
 from .atomic import atomic_write_text as atomic_write_text
+from .curve_points import CurvePoints as CurvePoints
+from .curve_points import load_curve as load_curve
 from .polygon_mesh import PolygonMesh as PolygonMesh
 from .reading import load_mesh as load_mesh
 from .writing import save_mesh as save_mesh

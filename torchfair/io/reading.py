@@ -60,7 +60,7 @@ def _read_raw(path: Path) -> RawMesh:
     if suffix not in (*_READERS, *others.READ):
         known = ", ".join((*_READERS, *others.READ))
         raise MeshFileError(path, f"the extension {suffix or '(none)'} is no known mesh format. Known are {known}")
-    data = _read_bytes(path)
+    data = read_bytes(path)
     if suffix in _READERS:
         for magic, name in _COMPRESSED.items():
             if data.startswith(magic):
@@ -69,7 +69,12 @@ def _read_raw(path: Path) -> RawMesh:
     return others.read_other(path)
 
 
-def _read_bytes(path: Path) -> bytes:
+def read_bytes(path: Path) -> bytes:
+    """The content of a regular file that is not empty.
+
+    Raises:
+        MeshFileError: if there is no such file or it cannot be read.
+    """
     try:
         if path.is_dir():
             raise MeshFileError(path, "is a folder, not a file")

@@ -8,6 +8,7 @@ from .camera import fit_camera as fit_camera
 from .camera import look_axes as look_axes
 from .lines import EdgeStyle as EdgeStyle
 from .picture_before_after import picture_before_after as picture_before_after
+from .picture_curvature import picture_curvature as picture_curvature
 from .picture_edges import picture_edges as picture_edges
 from .picture_gauss_images import picture_gauss_images as picture_gauss_images
 from .picture_mesh import picture_mesh as picture_mesh
