@@ -28,10 +28,12 @@ class CurvePoints(NamedTuple):
 
 
 def load_curve(path: str | os.PathLike[str]) -> CurvePoints:
-    """Reads a curve: three numbers a line, x y z, or six with a normal; commas count as blanks, # starts a comment.
+    """Reads a curve: three numbers a line, x y z, or six with a normal.
 
-    A line of words before the numbers, such as ``x,y,z``, is passed over. The points of a closed curve may end with the first
-    one repeated, which is left out.
+    Commas and semicolons count as blanks, # starts a comment.
+
+    A line of words before the numbers, such as ``x,y,z``, is passed over. The points of a closed curve may end
+    with the first one repeated, which is left out.
 
     Raises:
         MeshFileError: naming file and line, if the file cannot be read or a line is not three or six numbers.
