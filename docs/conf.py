@@ -19,7 +19,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = True
 nitpicky = True  # a reference that leads nowhere is a warning
-nitpick_ignore_regex = [("py:class", r"(torch|abc|collections)\..*")]
+nitpick_ignore_regex = [("py:class", r"(torch|abc|collections|scipy)\..*")]
 
 
 def mark_shapes(app, what, name, obj, options, lines):
