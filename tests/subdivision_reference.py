@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import torch
+from helpers import grid_faces, split_quads
 from torch import Tensor
 
 from torchfair import Topology
@@ -129,3 +131,17 @@ def reference_faces(topology: Topology, scheme: str) -> list[set[tuple[int, ...]
 def turned(face: tuple[int, ...]) -> tuple[int, ...]:
     start = face.index(min(face))
     return (*face[start:], *face[:start])
+
+
+def lattice(rows: int, columns: int, *, triangles: bool) -> tuple[Tensor, Topology]:
+    """A flat sheared regular lattice."""
+    faces = grid_faces(rows, columns)
+    i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
+    points = np.stack([i + 0.3 * j, 0.8 * j, 0 * i], axis=-1).reshape(-1, 3)
+    return torch.from_numpy(points), Topology.from_faces(split_quads(faces) if triangles else faces)
+
+
+def lattice_corners(topology: Topology, columns: int) -> Tensor:
+    mask = torch.zeros(topology.num_vertices, dtype=torch.bool)
+    mask[[0, columns - 1, -columns, -1]] = True
+    return mask

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import torch
 from geometry_meshes import capped_prism, icosphere, mixed_grid, torus, with_isolated
-from helpers import DOUBLE, cube, grid_faces, split_quads, tetrahedron, wavy_grid
-from torch import Tensor
+from helpers import DOUBLE, cube, split_quads, tetrahedron, wavy_grid
+from subdivision_reference import lattice, lattice_corners
 
 from torchfair import MeshError, ShapeError, Topology, TorchfairError
 from torchfair.geometry import angle_defects
@@ -164,20 +164,6 @@ def test_weights_of_loop_and_warren(valence: int) -> None:
         torch.testing.assert_close(tip, torch.tensor([0, 0, height], dtype=DOUBLE))
 
 
-def lattice(rows: int, columns: int, *, triangles: bool) -> tuple[Tensor, Topology]:
-    """A flat sheared regular lattice."""
-    faces = grid_faces(rows, columns)
-    i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
-    points = np.stack([i + 0.3 * j, 0.8 * j, 0 * i], axis=-1).reshape(-1, 3)
-    return torch.from_numpy(points), Topology.from_faces(split_quads(faces) if triangles else faces)
-
-
-def lattice_corners(topology: Topology, columns: int) -> Tensor:
-    mask = torch.zeros(topology.num_vertices, dtype=torch.bool)
-    mask[[0, columns - 1, -columns, -1]] = True
-    return mask
-
-
 @each_boundary
 @pytest.mark.parametrize("triangles", [True, False])
 def test_linear_functions_on_regular_lattices_are_reproduced(triangles: bool, boundary: str) -> None:
@@ -211,73 +197,6 @@ def test_second_differences_of_quadratic_data_quarter(triangles: bool) -> None:
     u, v, _ = midpoint(topology).apply(vertices).unbind(-1)
     moved = (fine - (u**2 - 0.7 * u * v + 0.4 * v**2 + 3 * u))[~step.topology.is_boundary_vertex]
     torch.testing.assert_close(moved, moved[:1].expand_as(moved))  # the same constant everywhere
-
-
-# ---- boundary and corners --------------------------------------------------------------------------------
-
-
-@each_boundary
-@pytest.mark.parametrize("scheme", [catmull_clark, hybrid])
-def test_the_boundary_depends_on_the_boundary_alone(scheme, boundary: str) -> None:
-    topology = mixed_grid()[1]
-    fine = scheme(topology, boundary=boundary)
-    on_rim = topology.is_boundary_vertex.numpy()
-    rows = fine.matrix[fine.topology.is_boundary_vertex.numpy()]
-    assert abs(rows[:, ~on_rim]).sum() == 0
-
-
-def test_the_boundary_is_a_cubic_spline_whatever_the_faces() -> None:
-    """The same polygon around triangles, quads or one face: the same fine boundary."""
-    vertices, quads = wavy_grid(3, 3)
-    rim = quads.boundary_loops()[0]
-    meshes = [quads, Topology.from_faces(split_quads(grid_faces(3, 3))), Topology.from_faces([rim.tolist()], 9)]
-    curves = [hybrid(topology).apply(vertices) for topology in meshes]
-    curves = [curve[hybrid(m).topology.boundary_loops()[0]] for curve, m in zip(curves, meshes, strict=True)]
-    polygon = vertices[rim]
-    expected = (polygon.roll(1, 0) + 6 * polygon + polygon.roll(-1, 0)) / 8
-    for curve in curves:
-        torch.testing.assert_close(curve[::2], expected)
-        torch.testing.assert_close(curve[1::2], (polygon + polygon.roll(-1, 0)) / 2)
-
-
-@each_boundary
-@pytest.mark.parametrize("scheme", ["loop", "catmull_clark", "hybrid"])
-def test_corners_stay_exactly_through_all_levels(scheme: str, boundary: str) -> None:
-    vertices, topology = wavy_grid(4, 4, triangles=True)
-    corners = torch.zeros(16, dtype=torch.bool)
-    corners[[0, 2, 5, 15]] = True  # two ends of the boundary, a vertex on a side, an interior vertex
-    fine = refine(topology, scheme, 3, boundary=boundary, corners=corners)
-    assert torch.equal(fine.apply(vertices)[:16][corners], vertices[corners])
-
-
-def test_interpolated_boundaries_keep_their_vertices_and_reproduce_cubics() -> None:
-    vertices, topology = wavy_grid(9, 3)
-    x = torch.arange(9.0, dtype=DOUBLE).repeat_interleave(3)
-    vertices[:, 2] = x**3 - 4 * x**2 + x
-    vertices[:, 0] = x
-    fine = hybrid(topology, boundary="interpolate")
-    new = fine.apply(vertices)
-    assert torch.equal(new[:27][topology.is_boundary_vertex], vertices[topology.is_boundary_vertex])
-    u, _, height = new.unbind(-1)
-    rim = fine.topology.is_boundary_vertex & (u > 1) & (u < 7)
-    assert rim.sum() > 15
-    torch.testing.assert_close(height[rim], (u**3 - 4 * u**2 + u)[rim])
-
-
-def test_interpolated_boundaries_between_corners_reproduce_quadratics() -> None:
-    vertices, topology = lattice(6, 5, triangles=True)
-    x, y, _ = vertices.unbind(-1)
-    values = torch.stack([x, y, x**2 + x * y - y**2], dim=-1)
-    fine = loop(topology, boundary="interpolate", corners=lattice_corners(topology, 5))
-    u, v, height = fine.apply(values)[fine.topology.is_boundary_vertex].unbind(-1)
-    torch.testing.assert_close(height, u**2 + u * v - v**2)
-
-
-def test_polylines_stay() -> None:
-    vertices, topology = mixed_grid()
-    fine = hybrid(topology, boundary="polyline")
-    rim = fine.topology.is_boundary_vertex
-    torch.testing.assert_close(fine.apply(vertices)[rim], midpoint(topology).apply(vertices)[rim])
 
 
 # ---- limits ----------------------------------------------------------------------------------------------
