@@ -5,6 +5,7 @@ With a folder as argument it writes PNG files there instead, to look at.
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
 from collections.abc import Callable
@@ -206,6 +207,48 @@ def _tube(panel: Panel) -> None:
     panel.text((1.5, -0.35), "direction of\nbending", color=GREEN, size=8)
 
 
+def curvature() -> Figure:
+    """Two ways to see curvature, balanced normals, and an incomplete star."""
+    side = (-2.0, 2.0, -0.8, 1.5)
+    figure, (jumps, change, balanced, border) = row(
+        ("normal cycle: face normals jump", side),
+        ("corrected: vertex normals change", side),
+        (r"balanced: $(u_v+u_w)\cdot(w-v)=0$", side),
+        ("a star on the boundary lacks a half", (-1.5, 1.5, -1.2, 1.2)),
+    )
+    profile = [polar(1.9, turn, (0.0, -1.6)) for turn in (128, 104, 76, 52)]
+    for panel in (jumps, change):
+        panel.line(*profile, width=2.6)
+        panel.dot(*profile)
+    for start, stop in itertools.pairwise(profile):
+        middle = mean_of([start, stop])
+        turn = math.degrees(math.atan2(middle[1] + 1.6, middle[0]))
+        jumps.arrow(middle, polar(0.75, turn, middle))
+    for turn, point in zip((128, 104, 76, 52), profile, strict=True):
+        change.arrow(point, polar(0.75, turn, point), color=RED)
+    v, w = (-0.9, -0.1), (0.9, -0.1)
+    balanced.line(*(polar(1.5, turn, (0.0, -1.3)) for turn in np.linspace(127, 53, 40)), color=FAINT, style=":")
+    balanced.line(v, w, width=2.6)
+    balanced.dot(v, w)
+    for point, turn, word, at in ((v, 127, "v", (-1.15, -0.3)), (w, 53, "w", (1.15, -0.3))):
+        balanced.arrow(point, polar(0.8, turn, point), color=RED)
+        balanced.text(at, f"${word}$")
+        balanced.text(polar(1.0, turn, point), f"$u_{word}$", color=RED)
+    balanced.arc(v, 0.4, 0, 127, color=INK)
+    balanced.arc(w, 0.4, 53, 180, color=INK)
+    ring = ring_of(1.1, 0, 1.1, 60, 1.1, 120, 1.1, 180)
+    for start, stop in itertools.pairwise(ring):
+        border.face((0, 0), start, stop)
+    border.line(ring[0], (0, 0), ring[-1], color=FAINT, width=2.6)
+    for end in ring[1:3]:
+        border.line((0, 0), end, color=RED, width=2.6)
+    border.dot((0, 0), size=6)
+    for end in (ring[0], ring[-1]):
+        border.line(end, polar(1.1, 300 if end[0] > 0 else 240), color=FAINT, style=":")
+    border.text((0, -0.5), "no faces,\nno angles", color=FAINT, size=8)
+    return figure
+
+
 # ---- curves and closest points -------------------------------------------------------------------------
 
 
@@ -284,7 +327,17 @@ def closest() -> Figure:
     return figure
 
 
-DRAWINGS: list[Callable[[], Figure]] = [edge, meaning, faces, defects, stencils, polylines, boundary, closest]
+DRAWINGS: list[Callable[[], Figure]] = [
+    edge,
+    meaning,
+    faces,
+    defects,
+    stencils,
+    curvature,
+    polylines,
+    boundary,
+    closest,
+]
 
 
 def main() -> None:

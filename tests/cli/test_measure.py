@@ -48,9 +48,15 @@ def test_unit_cube_in_closed_form() -> None:
         "normal_variation": 12 * math.sqrt(2),
         "angle_variation": 6 * math.pi,
         "total_mean_curvature": 3 * math.pi,
+        "total_absolute_curvature": 8,  # eight corners with two eigenvalues 1/2 each in their planes
+        "total_absolute_curvature_corrected": 8 * 2 / 3,  # 1/3 is the squared cosine between vertex and face normals
+        "total_frobenius_curvature": 4 * math.sqrt(2),
         "normal_variation_per_area": 2 * math.sqrt(2),
         "angle_variation_per_area": math.pi,
         "total_mean_curvature_per_area": math.pi / 2,
+        "total_absolute_curvature_per_area": 8 / 6,
+        "total_absolute_curvature_corrected_per_area": 16 / 18,
+        "total_frobenius_curvature_per_area": 4 * math.sqrt(2) / 6,
         "area": 6,
         "mean_edge_length": 1,
         "shortest_edge_length": 1,

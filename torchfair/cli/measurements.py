@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import torch
 from torch import Tensor
@@ -22,6 +24,9 @@ _ENERGIES = {
     "normal_variation": ("E   normal variation       sum l l*", LENGTH),
     "angle_variation": ("E'  angle variation        sum l |a|", LENGTH),
     "total_mean_curvature": ("    total mean curvature   1/2 sum l a", LENGTH),
+    "total_absolute_curvature": ("C   absolute curvature     sum |k1| + |k2|", LENGTH),
+    "total_absolute_curvature_corrected": ("C   the same, corrected    by vertex normals", LENGTH),
+    "total_frobenius_curvature": ("C2  Frobenius curvature    sum sqrt(k1^2 + k2^2)", LENGTH),
     "umbrella_fairness": ("    umbrella fairness", AREA),
     "polyline_fairness": ("    polyline fairness", AREA),
 }
@@ -115,11 +120,18 @@ def count_components(topology: Topology) -> int:
     return int(pieces) - int((topology.valences == 0).sum())
 
 
+def _energy(key: str) -> Callable[[Tensor, Topology], Tensor]:
+    if key == "total_absolute_curvature_corrected":
+        return partial(energies.total_absolute_curvature, estimator="corrected")
+    function: Callable[[Tensor, Topology], Tensor] = getattr(energies, key)
+    return function
+
+
 def _energies(vertices: Tensor, topology: Topology) -> list[Quantity]:
     area = float(geometry.face_areas(vertices, topology).sum())
-    values = {key: float(getattr(energies, key)(vertices, topology)) for key in _ENERGIES}
+    values = {key: float(_energy(key)(vertices, topology)) for key in _ENERGIES}
     rows = [Quantity(key, label, values[key], unit, "energies") for key, (label, unit) in _ENERGIES.items()]
-    for key in ("normal_variation", "angle_variation", "total_mean_curvature"):
+    for key in (key for key, (_, unit) in _ENERGIES.items() if unit == LENGTH):
         label = _ENERGIES[key][0][:25].rstrip()
         per_area = values[key] / area if area > 0 else None
         rows.append(Quantity(f"{key}_per_area", label, per_area, PER_LENGTH, "energies per area"))
