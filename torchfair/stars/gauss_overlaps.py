@@ -108,8 +108,8 @@ def _near_pairs(points: Floats, arcs: Ints, most_pairs: int) -> Iterator[tuple[I
             "looked at. Raise most_pairs, or count the self-intersections of pyramids only."
         )
     for i, j in couples:
-        for start in range(0, len(members[i]), _BLOCK):
-            some = members[i][start : start + _BLOCK]
+        for at in range(0, len(members[i]), _BLOCK):
+            some = members[i][at : at + _BLOCK]
             table = cKDTree(middle[some]).sparse_distance_matrix(
                 trees[j], longest[i] + longest[j], output_type="ndarray"
             )

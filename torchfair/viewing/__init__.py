@@ -10,8 +10,11 @@ from .lines import EdgeStyle as EdgeStyle
 from .picture_before_after import picture_before_after as picture_before_after
 from .picture_curvature import picture_curvature as picture_curvature
 from .picture_edges import picture_edges as picture_edges
+from .picture_gauss_image import picture_gauss_image as picture_gauss_image
 from .picture_gauss_images import picture_gauss_images as picture_gauss_images
 from .picture_mesh import picture_mesh as picture_mesh
+from .picture_pyramids import picture_pyramids as picture_pyramids
+from .picture_star_classes import picture_star_classes as picture_star_classes
 from .rasterise import Fragments as Fragments
 from .rasterise import rasterise as rasterise
 from .render import MeshView as MeshView

@@ -49,7 +49,7 @@ def picture_gauss_images(
     """
     before, after = one_mesh(before, topology), one_mesh(after, topology)
     images = gauss_image(before, topology), gauss_image(after, topology)
-    towards_eye, up = _viewpoint(before, topology)
+    towards_eye, up = viewpoint(before, topology)
     view = fit_sphere_view(*(image.points for image in images), towards_eye=towards_eye, up=up)
     panel = (width - 2 * MARGIN - GAP) // 2
     sheet = Sheet(width, CAPTION + panel + MARGIN, title)
@@ -66,7 +66,8 @@ def picture_gauss_images(
     return sheet.write(path, overwrite=overwrite)
 
 
-def _viewpoint(vertices: Tensor, topology: Topology) -> tuple[Tensor, Tensor]:
+def viewpoint(vertices: Tensor, topology: Topology) -> tuple[Tensor, Tensor]:
+    """From where to look at the Gauss image of one mesh ``(V, 3)``: direction to the eye, and what is up."""
     direction = view_direction(vertices, topology)
     area_vectors = face_area_vectors(vertices, topology).to("cpu", torch.float64)
     average = area_vectors.sum(0)

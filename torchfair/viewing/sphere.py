@@ -79,7 +79,9 @@ def draw_sphere(axes: Axes, view: SphereView) -> None:
     axes.add_collection(LineCollection(list(net[~behind][..., :2].numpy()), colors=_NET, linewidths=0.5, zorder=3))
 
 
-def draw_arcs(axes: Axes, view: SphereView, points: Tensor, arcs: Tensor, width: float, opacity: float = 1.0) -> None:
+def draw_arcs(
+    axes: Axes, view: SphereView, points: Tensor, arcs: Tensor, width: float, opacity: float = 1.0, color: str = _INK
+) -> None:
     """Great-circle arcs between points ``(N, 3)``: strong on the near half of the sphere, faint behind it.
 
     Arcs at points that are not unit vectors, and between opposite points, are left out.
@@ -91,13 +93,14 @@ def draw_arcs(axes: Axes, view: SphereView, points: Tensor, arcs: Tensor, width:
         arcs: ``(M, 2)`` point numbers.
         width: line width in typographic points.
         opacity: of the near lines.
+        color: of the near lines.
     """
     from matplotlib.collections import LineCollection
 
     pieces = [piece @ view.axes.T for piece in arc_pieces(points, arcs)]
-    for front, color, order, alpha in ((False, _BEHIND, 2, 0.6), (True, _INK, 4, opacity)):
+    for front, tint, order, alpha in ((False, _BEHIND, 2, 0.6), (True, color, 4, opacity)):
         lines = [line for piece in pieces for line in piece[(piece[..., 2].mean(1) >= 0) == front][..., :2].numpy()]
-        drawn = LineCollection(lines, colors=color, linewidths=width, alpha=alpha, zorder=order, capstyle="round")
+        drawn = LineCollection(lines, colors=tint, linewidths=width, alpha=alpha, zorder=order, capstyle="round")
         axes.add_collection(drawn)
 
 

@@ -1,0 +1,183 @@
+"""``torchfair diagnose``: which vertex stars are bad, and what that does to the Gauss image."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .arguments import count
+from .errors import CommandError
+from .inputs import read_input
+from .plain import to_json
+
+if TYPE_CHECKING:
+    from ..io import PolygonMesh
+    from .diagnosis import Diagnosis
+
+NAME = "torchfair diagnose"
+PICTURES = ("classes.png", "pyramids.png", "gauss_image.png")
+REPORT = "diagnosis.json"
+_DESCRIPTION = (
+    "Says of every inner vertex of a polygon mesh whether its star is convex, a good saddle, a bad saddle or neither, "
+    "and where the face normals around a vertex form a self-intersecting pyramid."
+)
+_ROWS = {
+    "convex": "convex",
+    "flat": "  flat among them",
+    "saddle": "saddle-shaped",
+    "good_saddle": "  good saddles among them",
+    "bad_saddle": "  bad saddles among them",
+    "neither": "neither",
+    "self_intersecting_pyramids": "normal pyramids that intersect themselves",
+    "pyramid_self_intersections": "  self-intersections",
+    "negative_angle_defects": "angle sum above 360 degrees",
+    "neither_with_negative_angle_defect": "  neither convex nor saddle among them",
+    "degenerate_stars": "stars with a face without area",
+    "boundary_vertices": "boundary vertices (not judged)",
+    "isolated_vertices": "vertices without a face (not judged)",
+}
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds ``diagnose`` to the commands."""
+    parser: argparse.ArgumentParser = subparsers.add_parser(
+        "diagnose", help="find bad saddles and folded normals", description=_DESCRIPTION, allow_abbrev=False
+    )
+    add = parser.add_argument
+    add("input", metavar="INPUT", help="mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh), or example:roof")
+    add("--json", action="store_true", help="print one JSON object instead of tables")
+    add("--per-vertex", action="store_true", help="with --json or --output: list the class of every vertex")
+    add("--worst", type=count, default=10, metavar="N", help="list the N worst vertices (default 10)")
+    add("-o", "--output", metavar="FOLDER", help=f"folder for {REPORT} and pictures; nothing is written without it")
+    add("--vertex", type=count, action="append", default=[], metavar="V", help="draw the normal pyramid of this vertex "
+        "(counted from 0); repeatable; by default of the worst, then of some of each class")  # fmt: skip
+    add("--no-pictures", action="store_true", help="write no pictures")
+    add("--force", action="store_true", help="replace files that exist")
+    add("--repair", action="store_true", help="orient faces consistently and drop unused vertices first")
+    parser.set_defaults(run=run, name=NAME)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Checks what can be checked first, then reads, judges, writes and prints."""
+    from .diagnosis import counts, diagnose_mesh, per_vertex, worst_vertices
+
+    files = _files(arguments)
+    mesh = read_input(arguments.input, arguments.repair)
+    _check_vertices(arguments.vertex, mesh)
+    diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
+    numbers, worst = counts(diagnosis), worst_vertices(diagnosis, arguments.worst)
+    report = {**numbers, "file": arguments.input, "repairs": list(mesh.repairs), "worst_vertices": worst}
+    if arguments.per_vertex:
+        report["per_vertex"] = per_vertex(diagnosis)
+    if files:
+        write(files, mesh, diagnosis, report, arguments)
+    if arguments.json:
+        sys.stdout.write(to_json(report))
+        return 0
+    for sentence in mesh.repairs:
+        print(f"repaired: {sentence}")
+    print(f"{arguments.input}\n{format_counts(numbers)}")
+    if worst:
+        print(format_vertices(worst))
+    print("".join(f"wrote {path}\n" for path in files), end="")
+    return 0
+
+
+def write(
+    files: list[Path], mesh: PolygonMesh, diagnosis: Diagnosis, report: dict[str, Any], arguments: argparse.Namespace
+) -> None:
+    """Writes report and pictures, each whole or not at all."""
+    from ..io import atomic_write_text
+
+    files[0].parent.mkdir(parents=True, exist_ok=True)
+    atomic_write_text(files[0], to_json(report), overwrite=arguments.force)
+    if len(files) == 1:
+        return
+    from ..viewing.picture_gauss_image import picture_gauss_image
+    from ..viewing.picture_pyramids import picture_pyramids
+    from ..viewing.picture_star_classes import picture_star_classes
+
+    vertices, topology, classes, crossings = mesh.vertices, mesh.topology, diagnosis.classes, diagnosis.crossings
+    overview, pyramids, sphere = files[1:]
+    picture_star_classes(overview, vertices, classes, crossings, overwrite=arguments.force)
+    chosen = arguments.vertex or _instructive(diagnosis, report["worst_vertices"])
+    picture_pyramids(pyramids, vertices, classes, crossings, chosen, overwrite=arguments.force)
+    picture_gauss_image(sphere, vertices, topology, crossings, overwrite=arguments.force)
+
+
+def format_counts(numbers: dict[str, Any]) -> str:
+    """Counts as lines of text, with the share of all inner vertices."""
+    width = max(map(len, _ROWS.values()))
+    inner = numbers["inner_vertices"]
+    lines = ["", f"  {'inner vertices':<{width}}  {inner:>9}"]
+    for key, label in _ROWS.items():
+        share = "" if "not judged" in label or not inner else f"  {100 * numbers[key] / inner:5.1f} %"
+        lines.append(f"  {label:<{width}}  {numbers[key]:>9}{share if key != 'pyramid_self_intersections' else ''}")
+    crossings, between = numbers["gauss_image_crossings"], numbers["gauss_image_crossings_between_stars"]
+    words = "not counted" if crossings is None else f"{crossings:>9}  ({between} of them between different stars)"
+    lines.append(f"  {'crossings in the whole Gauss image':<{width}}  {words}")
+    for title, key in (("saddles by edges above and below their best plane", "saddle_patterns"),
+                       ("inner vertices by edges above and below the plane at the vertex normal", "ordinary_patterns")):  # fmt: skip
+        shown = list(numbers[key].items())
+        if shown:
+            more = f", {len(shown) - 8} other patterns" if len(shown) > 8 else ""
+            lines += ["", title, "  " + ", ".join(f"{name}: {n}" for name, n in shown[:8]) + more]
+    return "\n".join(lines)
+
+
+def format_vertices(worst: list[dict[str, Any]]) -> str:
+    """The worst vertices as a table."""
+    lines = [
+        "",
+        "worst vertices (perimeter of the normal pyramid in degrees; edges above and below the plane at the normal)",
+        f"  {'vertex':>9} {'valence':>8} {'class':>12} {'crossings':>10} {'perimeter':>10}  edges",
+    ]
+    for row in worst:
+        edges = ",".join(map(str, row["ordinary_pattern"])) or "-"
+        lines.append(
+            f"  {row['vertex']:>9} {row['valence']:>8} {row['class']:>12} {row['self_intersections']:>10} "
+            f"{row['perimeter_degrees']:>10.4g}  {edges}"
+        )
+    return "\n".join(lines)
+
+
+def _files(arguments: argparse.Namespace) -> list[Path]:
+    """The files to write, the report first; refuses those that exist."""
+    if arguments.output is None:
+        if arguments.vertex:
+            raise CommandError("--vertex draws a picture and needs a folder for it: --output FOLDER")
+        return []
+    files = [Path(arguments.output) / name for name in (REPORT, *(() if arguments.no_pictures else PICTURES))]
+    existing = [str(path) for path in files if path.exists()]
+    if existing and not arguments.force:
+        raise CommandError(f"{', '.join(existing)} exists: choose another folder, or --force to replace")
+    return files
+
+
+def _check_vertices(chosen: list[int], mesh: PolygonMesh) -> None:
+    topology = mesh.topology
+    for vertex in chosen:
+        if vertex >= topology.num_vertices:
+            raise CommandError(f"--vertex {vertex}: numbers run from 0 to {topology.num_vertices - 1}")
+        if topology.is_boundary_vertex[vertex] or not topology.valences[vertex]:
+            raise CommandError(f"--vertex {vertex}: it is not inside the mesh and has no normal pyramid")
+
+
+def _instructive(diagnosis: Diagnosis, worst: list[dict[str, Any]]) -> list[int]:
+    """The two worst vertices and some of each class, six in all if there are so many."""
+    import torch
+
+    from ..stars import StarKind
+
+    classes = diagnosis.classes
+    chosen = [row["vertex"] for row in worst[:2]]
+    convex = classes.is_kind(StarKind.CONVEX) & ~classes.flat
+    bad = classes.is_kind(StarKind.SADDLE) & ~classes.good
+    neither = classes.is_kind(StarKind.NEITHER)
+    for mask, most in ((bad, 3), (classes.good, 5), (convex, 6), (neither | bad | convex, 6), (diagnosis.inner, 6)):
+        found = torch.nonzero(mask).squeeze(1)
+        others = [v for v in found[:: max(1, len(found) // 12)].tolist() if v not in chosen]
+        chosen += others[: max(0, most - len(chosen))]
+    return chosen

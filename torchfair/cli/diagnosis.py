@@ -1,0 +1,171 @@
+"""Everything that ``torchfair diagnose`` says about the stars of a mesh."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ..errors import MeshError
+from ..stars import (
+    GaussOverlaps,
+    StarClasses,
+    StarKind,
+    classify_stars,
+    gauss_overlaps,
+    pyramid_perimeters,
+    pyramid_self_intersections,
+    pyramid_windings,
+)
+from ..topology import Topology
+
+MOST_ARCS = 200_000
+"""Interior edges up to which crossings in the whole Gauss image are counted."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Stars and normal pyramids of one mesh.
+
+    Attributes:
+        topology: connectivity.
+        classes: what each star is.
+        crossings: (V,) self-intersections of each normal pyramid.
+        perimeters: (V,) of the pyramids, in radians.
+        windings: (V,) of the pyramids around the vertex normals.
+        overlaps: crossings in the whole Gauss image; None where the mesh is too large or too crumpled.
+    """
+
+    topology: Topology
+    classes: StarClasses
+    crossings: Tensor
+    perimeters: Tensor
+    windings: Tensor
+    overlaps: GaussOverlaps | None
+
+    @property
+    def inner(self) -> Tensor:
+        """(V,) bool, the vertices that have a star to judge."""
+        return ~self.classes.is_kind(StarKind.EXCLUDED)
+
+    def class_names(self) -> list[str]:
+        """Class of every vertex: convex, saddle, neither, boundary or isolated."""
+        names = ["convex", "saddle", "neither", "boundary", "isolated"]
+        isolated = (self.topology.valences == 0).to(torch.int64)
+        return [names[code] for code in (self.classes.kinds.to(torch.int64) + isolated).tolist()]
+
+
+def diagnose_mesh(vertices: Tensor, topology: Topology) -> Diagnosis:
+    """Judges all stars of one mesh ``(V, 3)``."""
+    overlaps = None
+    if topology.num_interior_edges <= MOST_ARCS:
+        try:
+            overlaps = gauss_overlaps(vertices, topology)
+        except MeshError:  # too many arcs near each other
+            overlaps = None
+    return Diagnosis(
+        topology=topology,
+        classes=classify_stars(vertices, topology),
+        crossings=pyramid_self_intersections(vertices, topology),
+        perimeters=pyramid_perimeters(vertices, topology),
+        windings=pyramid_windings(vertices, topology),
+        overlaps=overlaps,
+    )
+
+
+def counts(diagnosis: Diagnosis) -> dict[str, Any]:
+    """The numbers, by the keys of the JSON output."""
+    classes, topology, inner = diagnosis.classes, diagnosis.topology, diagnosis.inner
+    convex, saddle, neither = (classes.is_kind(kind) for kind in (StarKind.CONVEX, StarKind.SADDLE, StarKind.NEITHER))
+    folded = diagnosis.crossings > 0
+    perimeters = diagnosis.perimeters[inner].rad2deg()
+    overlaps = diagnosis.overlaps
+    windings, frequencies = torch.unique(diagnosis.windings[inner], return_counts=True)
+    return {
+        "vertices": topology.num_vertices,
+        "faces": topology.num_faces,
+        "inner_vertices": _count(inner),
+        "boundary_vertices": _count(topology.is_boundary_vertex),
+        "isolated_vertices": _count(topology.valences == 0),
+        "convex": _count(convex),
+        "flat": _count(classes.flat),
+        "saddle": _count(saddle),
+        "good_saddle": _count(classes.good),
+        "bad_saddle": _count(saddle & ~classes.good),
+        "neither": _count(neither),
+        "degenerate_stars": _count(classes.degenerate),
+        "self_intersecting_pyramids": _count(folded),
+        "self_intersecting_pyramids_by_class": {
+            "convex": _count(folded & convex),
+            "good_saddle": _count(folded & classes.good),
+            "bad_saddle": _count(folded & saddle & ~classes.good),
+            "neither": _count(folded & neither),
+        },
+        "pyramid_self_intersections": int(diagnosis.crossings.sum()),
+        "mean_pyramid_perimeter_degrees": float(perimeters.mean()) if perimeters.numel() else None,
+        "largest_pyramid_perimeter_degrees": float(perimeters.max()) if perimeters.numel() else None,
+        "positive_angle_defects": _count(classes.defect_signs > 0),
+        "negative_angle_defects": _count(classes.defect_signs < 0),
+        "neither_with_negative_angle_defect": _count(neither & (classes.defect_signs < 0)),
+        "saddle_patterns": _named(classes.pattern_counts(kind=StarKind.SADDLE)),
+        "ordinary_patterns": _named(classes.pattern_counts(ordinary=True)),
+        "pyramid_windings": {str(w): n for w, n in zip(windings.tolist(), frequencies.tolist(), strict=True)},
+        "gauss_image_crossings": None if overlaps is None else overlaps.crossings,
+        "gauss_image_crossings_between_stars": None if overlaps is None else overlaps.between_stars,
+    }
+
+
+def worst_vertices(diagnosis: Diagnosis, count: int) -> list[dict[str, Any]]:
+    """The ``count`` worst vertices that are no convex or good saddle stars, or have a self-intersecting pyramid.
+
+    Those with most self-intersections come first, then those that are neither convex nor saddles, then those with
+    the longest perimeters, then smaller numbers.
+    """
+    classes, crossings = diagnosis.classes, diagnosis.crossings
+    neither = classes.is_kind(StarKind.NEITHER)
+    suspect = torch.nonzero((crossings > 0) | neither | (classes.is_kind(StarKind.SADDLE) & ~classes.good)).squeeze(1)
+    # Sorted by the least important key first; a perimeter rounded to 1e-9 keeps ties in the order of the numbers.
+    for key in ((diagnosis.perimeters * 1e9).round(), neither.to(torch.int64), crossings):
+        suspect = suspect[key[suspect].argsort(descending=True, stable=True)]
+    return [describe_vertex(diagnosis, vertex) for vertex in suspect[:count].tolist()]
+
+
+def describe_vertex(diagnosis: Diagnosis, vertex: int) -> dict[str, Any]:
+    """One inner vertex in words and numbers."""
+    classes = diagnosis.classes
+    good = bool(classes.good[vertex])
+    name = StarKind(int(classes.kinds[vertex])).name.lower()
+    return {
+        "vertex": vertex,
+        "valence": int(diagnosis.topology.valences[vertex]),
+        "class": f"{'good' if good else 'bad'} saddle" if name == "saddle" else name,
+        "pattern": list(classes.pattern(vertex)),
+        "ordinary_pattern": list(classes.pattern(vertex, ordinary=True)),
+        "inflection_faces": int(classes.inflection_counts[vertex]),
+        "self_intersections": int(diagnosis.crossings[vertex]),
+        "perimeter_degrees": math.degrees(float(diagnosis.perimeters[vertex])),
+        "angle_defect_sign": int(classes.defect_signs[vertex]),
+    }
+
+
+def per_vertex(diagnosis: Diagnosis) -> dict[str, list[Any]]:
+    """Lists with one entry for each vertex."""
+    return {
+        "class": diagnosis.class_names(),
+        "good_saddle": diagnosis.classes.good.tolist(),
+        "self_intersections": diagnosis.crossings.tolist(),
+        "perimeter_degrees": diagnosis.perimeters.rad2deg().tolist(),
+        "winding": diagnosis.windings.tolist(),
+        "angle_defect_sign": diagnosis.classes.defect_signs.tolist(),
+    }
+
+
+def _count(mask: Tensor) -> int:
+    return int(mask.sum())
+
+
+def _named(patterns: dict[tuple[int, ...], int]) -> dict[str, int]:
+    return {",".join(map(str, lengths)) or "-": count for lengths, count in patterns.items()}

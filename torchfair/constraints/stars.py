@@ -1,0 +1,74 @@
+"""Vertex stars become good saddles, normal pyramids free of self-intersections."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from ..projection import ElementTerm
+from ..projection.layout import State
+from ..stars._groups import star_groups
+from ..stars._saddle_targets import saddle_targets, star_shape
+from ..stars.pyramid_penalty import crossing_depths
+from ..stars.saddle_penalty import saddle_defects, saddle_groups
+from ..topology import Topology
+
+
+def star_crossings(x: Tensor) -> Tensor:
+    """Depths of the crossings in the normal pyramid of a star: ``x`` (k+1, 3), centre first, to (k (k-3) / 2,)."""
+    depths = crossing_depths(star_shape(x[1:] - x[0]).sectors)
+    size = depths.shape[0]
+    first, second = torch.triu_indices(size, size, 2, device=x.device)
+    apart = (second - first) < size - 1  # the last arc is a neighbour of the first
+    return depths[first[apart], second[apart]]
+
+
+def pyramid_terms(topology: Topology, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
+    """Depths of the self-intersections of all normal pyramids; zero, and silent, where there are none.
+
+    The normals are those of the sectors between neighbouring edges: of the faces, where these are planar.
+    """
+    terms = []
+    for centres, ring, _ in star_groups(topology):
+        if ring.shape[1] > 3:
+            stencil = [(block, torch.cat([centres[:, None], ring], dim=1))]
+            terms.append(ElementTerm("pyramids", star_crossings, stencil, weight=weight))
+    return terms
+
+
+def saddle_terms(
+    topology: Topology, saddles: Tensor, *, weight: float, margin: float = 0.0, block: str = "vertices"
+) -> list[ElementTerm]:
+    """Amounts by which the stars of ``saddles`` miss being good saddles; zero, and silent, for good ones.
+
+    Args:
+        topology: Any polygon mesh.
+        saddles: (V,) bool, inner vertices with 4 to 16 edges.
+        weight: Dimensionless.
+        margin: Sine of the angle by which bends and sides of edges have to be clear of zero. With 0 the solver
+            stops at the border, where rounding decides.
+        block: Name of the vertex block.
+
+    Raises:
+        MeshError: a chosen vertex cannot be a saddle.
+    """
+
+    def miss(x: Tensor, sides: Tensor, normal: Tensor) -> Tensor:
+        return saddle_defects(x[1:] - x[0], sides, normal, margin)
+
+    terms = []
+    for group in saddle_groups(topology, saddles):
+        stencil = torch.cat([group.centres[:, None], group.ring], dim=1)
+        refresh = _targets_of(block, stencil, group.patterns)
+        terms.append(ElementTerm("good saddles", miss, [(block, stencil)], weight=weight, refresh=refresh))
+    return terms
+
+
+def _targets_of(block: str, stencil: Tensor, patterns: Tensor) -> Callable[[State], tuple[Tensor, Tensor]]:
+    def refresh(state: State) -> tuple[Tensor, Tensor]:
+        stars = state[block][stencil]
+        return saddle_targets(stars[:, 1:] - stars[:, :1], patterns)
+
+    return refresh

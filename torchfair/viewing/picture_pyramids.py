@@ -1,0 +1,88 @@
+"""Normal pyramids of chosen vertices, drawn on the unit sphere."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from ..errors import ShapeError
+from ..stars import StarClasses, StarKind, normal_pyramid
+from .render import one_mesh
+from .sheet import CAPTION, GAP, MARGIN, Sheet, points
+from .sphere import draw_arcs, draw_points, draw_sphere, fit_sphere_view, on_sphere
+
+
+def picture_pyramids(
+    path: str | os.PathLike[str],
+    vertices: Tensor,
+    classes: StarClasses,
+    crossings: Tensor,
+    chosen: Sequence[int],
+    title: str = "",
+    *,
+    columns: int = 3,
+    width: int = 1600,
+    overwrite: bool = False,
+) -> tuple[int, int]:
+    """Writes a PNG with the normal pyramids of chosen inner vertices (paper Figs. 2 and 4).
+
+    Each is seen from outside along its mean normal, in a window of its own size: the finer the mesh, the smaller
+    the pyramids; the net of circles tells how small.
+
+    Args:
+        path: the PNG file.
+        vertices: positions ``(V, 3)``.
+        classes: see :func:`torchfair.stars.classify_stars`.
+        crossings: (V,) see :func:`torchfair.stars.pyramid_self_intersections`.
+        chosen: vertex numbers; a picture without any says so.
+        title: words on top; none by default.
+        columns: pyramids in a row.
+        width: columns of pixels of the file; the number of rows follows.
+        overwrite: whether an existing file may be replaced.
+
+    Returns:
+        Width and height of the picture in pixels.
+
+    Raises:
+        ShapeError: if positions are not one mesh that fits the topology.
+        MeshError: if a chosen vertex is not inside the mesh.
+        MeshFileError: if the file cannot be written.
+    """
+    if columns < 1:
+        raise ShapeError("columns", "at least one", columns)
+    topology = classes.topology
+    vertices = one_mesh(vertices, topology)
+    panel = (width - 2 * MARGIN - (columns - 1) * GAP) // columns
+    rows = max(1, -(-len(chosen) // columns))
+    sheet = Sheet(width, rows * (2 * CAPTION + panel) + MARGIN if chosen else 3 * CAPTION, title)
+    if not chosen:
+        sheet.caption("no vertex inside the mesh has a normal pyramid", MARGIN, sheet.top + CAPTION, width - 2 * MARGIN)
+    for number, vertex in enumerate(chosen):
+        left = MARGIN + (number % columns) * (panel + GAP)
+        top = sheet.top + (number // columns) * (2 * CAPTION + panel)
+        normals = normal_pyramid(vertices, topology, vertex)
+        _draw(sheet, normals, left, top + 2 * CAPTION, panel)
+        kind = StarKind(int(classes.kinds[vertex])).name.lower()
+        if kind == "saddle":
+            kind = "good saddle" if bool(classes.good[vertex]) else "bad saddle"
+        pattern = ",".join(map(str, classes.pattern(vertex, ordinary=True)))
+        sheet.caption(f"vertex {vertex}: {kind}", left, top, panel)
+        words = f"edges {pattern}" + (f", {int(crossings[vertex])} crossings" if crossings[vertex] else "")
+        sheet.text(words, left + panel / 2, top + 1.35 * CAPTION, 21, "#5b6472", ha="center", va="center")
+    return sheet.write(path, overwrite=overwrite)
+
+
+def _draw(sheet: Sheet, normals: Tensor, left: int, top: int, size: int) -> None:
+    normals = normals.to("cpu", torch.float64)
+    mean = on_sphere(normals).sum(0)
+    towards_eye = mean if bool(torch.linalg.vector_norm(mean) > 1e-9) else torch.tensor([0.0, 0, 1])
+    view = fit_sphere_view(normals, towards_eye=towards_eye, up=torch.tensor([0.0, 1, 0]))
+    axes = sheet.axes(left, top, size, size)
+    draw_sphere(axes, view)
+    index = torch.arange(len(normals))
+    draw_arcs(axes, view, normals, torch.stack([index, index.roll(-1)], dim=1), points(3.0))
+    draw_points(axes, view, normals, points(9))
+    sheet.note(f"net: {view.net_step}\N{DEGREE SIGN}", left, top - 8)
