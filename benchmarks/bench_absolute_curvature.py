@@ -13,6 +13,7 @@ problem is solved before, so that nothing is timed that is done once in a proces
 V, unknowns    vertices of our mesh; unknowns last solved for: all blocks, fixed vertices included
 steps, C       damped steps, rejected ones too; total absolute curvature of the result
 total, 1 %     seconds of the whole call, and to within 1 % of the final C: least of the repetitions
+proc.          processor time to within 1 %: with ``--threads 1`` what a quiet machine would take at most, about
 lifted         the paper's variables in our engine, stopped after ``--lifted-limit`` seconds. Its time to 1 % is
                that to within 1 % of our final C or, if it ends by itself, of its own if that comes sooner;
                a lower bound ``>`` if neither comes
@@ -39,6 +40,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from barrel_problem import barrel
 from torch import Tensor
 
 import torchfair
@@ -61,6 +63,8 @@ class Printed:
     seconds: float
 
 
+Seconds = tuple[float, float]  # wall, processor
+
 TABLE = {
     555: Printed("13c", 17, 7, 45.5, 3.8),
     1056: Printed("13a", 33, 14, 124.4, 16.1),
@@ -73,39 +77,6 @@ TABLE = {
 }
 
 
-def barrel(size: int, *, height: float = 2.0, bulge: float = 0.25) -> tuple[Tensor, Topology]:
-    """Tube of nearly equilateral triangles with about ``size`` vertices, wider in the middle by ``bulge``."""
-    columns, rows = _lattice(size, height)
-    row, column = (grid.reshape(-1) for grid in _grid(rows + 1, columns))
-    along, angle = row / rows, 2 * math.pi * (column + 0.5 * (row % 2)) / columns
-    radius = 1.0 + bulge * 4.0 * along * (1.0 - along)
-    vertices = torch.stack([radius * angle.cos(), radius * angle.sin(), height * along], dim=1).double()
-    j, i = (grid.reshape(-1) for grid in _grid(rows, columns))
-    here, right = j * columns + i, j * columns + (i + 1) % columns
-    up, beside = here + columns, right + columns
-    even = (j % 2 == 0)[:, None]
-    lower = torch.where(even, torch.stack([here, right, up], 1), torch.stack([here, right, beside], 1))
-    upper = torch.where(even, torch.stack([right, beside, up], 1), torch.stack([here, beside, up], 1))
-    return vertices, Topology.from_faces(torch.cat([lower, upper]))
-
-
-def _grid(rows: int, columns: int) -> tuple[Tensor, ...]:
-    return torch.meshgrid(torch.arange(rows), torch.arange(columns), indexing="ij")
-
-
-def _lattice(size: int, height: float) -> tuple[int, int]:
-    """Columns and rows of triangles: a count near ``size`` first, then their shape."""
-    ideal = math.sqrt(2 * math.pi * size * math.sqrt(0.75) / height)
-
-    def misfit(columns: int) -> float:
-        rows = max(2, round(size / columns) - 1)
-        shape = height / rows / (2 * math.pi / columns * math.sqrt(0.75))
-        return abs((rows + 1) * columns / size - 1.0) + 0.05 * abs(math.log(shape))
-
-    columns = min(range(max(6, int(0.8 * ideal)), int(1.25 * ideal) + 2), key=misfit)
-    return columns, max(2, round(size / columns) - 1)
-
-
 @dataclass(frozen=True)
 class Run:
     """A call, and when it had reached which C."""
@@ -113,13 +84,13 @@ class Run:
     result: FormResult
     seconds: float
     processor: float
-    trace: list[tuple[float, float]]
+    trace: list[tuple[float, float, float]]
     stopped: bool
 
-    def within(self, curvature: float, percent: float = 1.0) -> float | None:
-        """Seconds until C was first at most so much above the given one."""
+    def within(self, curvature: float, percent: float = 1.0) -> Seconds | None:
+        """Wall and processor time until C was first at most so much above the given one."""
         bound = (1.0 + percent / 100.0) * curvature
-        return next((when for when, reached in self.trace if reached <= bound), None)
+        return next(((wall, processor) for wall, processor, reached in self.trace if reached <= bound), None)
 
     @property
     def curvature(self) -> float:
@@ -150,11 +121,12 @@ class Run:
 
 def run(mesh: tuple[Tensor, Topology], settings: FormSettings | None = None, limit: float = math.inf) -> Run:
     """One call, stopped after ``limit`` seconds."""
-    trace: list[tuple[float, float]] = []
+    trace: list[tuple[float, float, float]] = []
     start, processor = time.perf_counter(), time.process_time()
 
     def look(record: IterationRecord) -> bool:
-        trace.append((time.perf_counter() - start, record.quantities["total_absolute_curvature"]))
+        reached = record.quantities["total_absolute_curvature"]
+        trace.append((time.perf_counter() - start, time.process_time() - processor, reached))
         return trace[-1][0] > limit
 
     result = minimise_absolute_curvature(*mesh, settings=settings, callback=look)
@@ -172,9 +144,10 @@ def measure(size: int, repeats: int) -> tuple[Run, dict[str, object]]:
     mesh = barrel(size)
     runs = [run(mesh) for _ in range(repeats)]
     best = min(runs, key=lambda one: one.seconds)
-    least = min(one.within(one.curvature) or one.seconds for one in runs)
-    row = {"size": size, "vertices": mesh[1].num_vertices, **best.row(), "within_s": least}
-    return best, row
+    whole = (best.seconds, best.processor)
+    wall, processor = (min(times) for times in zip(*(one.within(one.curvature) or whole for one in runs), strict=True))
+    row = {"size": size, "vertices": mesh[1].num_vertices, **best.row()}
+    return best, {**row, "within_s": wall, "within_processor_s": processor}
 
 
 def measure_lifted(size: int, ours: Run, limit: float) -> dict[str, object]:
@@ -183,12 +156,14 @@ def measure_lifted(size: int, ours: Run, limit: float) -> dict[str, object]:
     to_ours = lifted.within(ours.curvature)
     to_own = None if lifted.stopped else lifted.within(lifted.curvature)
     reached = [when for when in (to_ours, to_own) if when is not None]
+    wall, processor = min(reached, default=(lifted.seconds, lifted.processor))
     return {
         **lifted.row(),
         "stopped": lifted.stopped,
         "within_of_ours_s": to_ours,
         "within_of_own_s": to_own,
-        "within_s": min(reached) if reached else lifted.seconds,
+        "within_s": wall,
+        "within_processor_s": processor,
         "within_reached": bool(reached),
     }
 
@@ -196,65 +171,74 @@ def measure_lifted(size: int, ours: Run, limit: float) -> dict[str, object]:
 def report(row: dict[str, object], lifted: dict[str, object] | None, printed: Printed | None) -> None:
     """One line of the table."""
     print(f"{row['vertices']:>6}{row['unknowns']:>8}{row['steps']:>4}{row['curvature']:8.3f}", end="")
-    print(f"{row['total_s']:8.2f}{row['within_s']:7.2f} |", end="")
+    print(f"{row['total_s']:8.2f}{row['within_s']:7.2f}{row['within_processor_s']:7.2f} |", end="")
     if lifted is None:
-        print(f"{'-':>8}{'-':>5}{'-':>8}{'-':>9}{'-':>9} |", end="")
+        print(f"{'-':>8}{'-':>5}{'-':>8}{'-':>8}{'-':>12} |", end="")
     else:
         mark = " " if lifted["within_reached"] else ">"
         print(f"{lifted['unknowns']:>8}{lifted['steps']:>5}{lifted['curvature']:8.3f}", end="")
         print(
-            f"{lifted['total_s']:8.1f}{'*' if lifted['stopped'] else ' '}{mark:>2}{lifted['within_s']:7.1f} |", end=""
+            f"{lifted['total_s']:8.1f}{'*' if lifted['stopped'] else ' '}{mark:>3}{lifted['within_s']:8.1f} |", end=""
         )
     if printed is None:
         print(f"{'-':>6}{'-':>4}{'-':>7} |", end="")
     else:
         print(f"{printed.variables:>5}k{printed.iterations:>4}{printed.seconds:7.1f} |", end="")
-    over_lifted = "-" if lifted is None else f"{mark if mark == '>' else ''}{lifted['within_s'] / row['within_s']:.1f}"
-    over_paper = "-" if printed is None else f"{printed.seconds / row['within_s']:.1f}"
-    print(f"{over_lifted:>8}{over_paper:>7} |", end="")
+    for over in ("within_s", "within_processor_s"):
+        print("      -" if lifted is None else f"{mark}{lifted[over] / row[over]:6.1f}", end="")
+        print("      -" if printed is None else f"{printed.seconds / row[over]:7.1f}", end=" |")
     print(*(f"{100 * part / row['total_s']:4.0f}" for part in row["split_s"].values()), flush=True)
 
 
-HEADER = f"""{"ours":>40} |{"lifted, the paper's variables":>39} |{"paper":>17} |{"ratios":>15} | split, %
-{"V":>6}{"unkn.":>8}{"st.":>4}{"C":>8}{"total":>8}{"1 %":>7} |{"unkn.":>8}{"st.":>5}{"C":>8}{"total":>8} {"1 %":>9} |\
-{"var":>6}{"it":>4}{"total":>7} |{"lifted":>8}{"paper":>7} | lin. sol. mer. oth. out."""
+HEADER = f"""{"ours":>47} |{"lifted, the paper's variables":>41} |{"paper":>17} |{"ratios, wall":>14} |\
+{"processor":>14} | split, %
+{"V":>6}{"unkn.":>8}{"st.":>4}{"C":>8}{"total":>8}{"1 %":>7}{"proc.":>7} |{"unkn.":>8}{"st.":>5}{"C":>8}{"total":>8}\
+{"1 %":>12} |{"var":>6}{"it":>4}{"total":>7} |{"lifted":>7}{"paper":>7} |{"lifted":>7}{"paper":>7} |\
+ lin. sol. mer. oth. out."""
 
 
-def in_its_own_process(size: int, threads: int) -> dict[str, object]:
+def in_its_own_process(size: int, repeats: int, threads: int) -> dict[str, object]:
     """Ours at one size, with the largest memory of the process."""
-    command = [sys.executable, __file__, "--child", str(size), "--threads", str(threads)]
+    options = {"--child": size, "--repeats": repeats, "--threads": threads}
+    command = [sys.executable, __file__, *(str(word) for pair in options.items() for word in pair)]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
-def child(size: int) -> None:
+def child(size: int, repeats: int) -> None:
     """Measures one size and prints JSON."""
     warm_up()
-    _, row = measure(size, 1)
+    _, row = measure(size, repeats)
     unit = 2**30 if sys.platform == "darwin" else 2**20  # bytes there, kibibytes elsewhere
     print(json.dumps({**row, "peak_memory_gib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit}))
 
 
-def growth(sizes: list[int], threads: int) -> dict[str, object]:
+def growth(sizes: list[int], repeats: int, threads: int) -> dict[str, object]:
     """Exponent of the time to 1 % and memory."""
-    print(f"\n{'V':>7}{'steps':>7}{'C':>9}{'total':>9}{'1 %':>9}{'memory':>10}")
+    print(f"\n{'V':>7}{'steps':>7}{'C':>9}{'total':>9}{'1 %':>9}{'proc.':>9}{'memory':>10}")
     rows = []
     for size in sizes:
-        rows.append(in_its_own_process(size, threads))
+        rows.append(in_its_own_process(size, repeats if size < 20_000 else 1, threads))
         last = rows[-1]
-        print(f"{last['vertices']:>7}{last['steps']:>7}{last['curvature']:9.3f}{last['total_s']:9.2f}", end="")
-        print(f"{last['within_s']:9.2f}{last['peak_memory_gib']:6.2f} GiB", flush=True)
+        print(f"{last['vertices']:>7}{last['steps']:>7}{last['curvature']:9.3f}", end="")
+        print(*(f"{last[time]:8.2f}" for time in ("total_s", "within_s", "within_processor_s")), end="")
+        print(f"{last['peak_memory_gib']:6.2f} GiB", flush=True)
     summary: dict[str, object] = {"rows": rows}
     if len(rows) > 1:
-        logs = torch.tensor([[math.log(row[key]) for row in rows] for key in ("vertices", "within_s")])
-        across, up = logs - logs.mean(1, keepdim=True)
-        summary["exponent"] = float((across * up).sum() / (across * across).sum())
-        met = verdict(summary["exponent"] <= GROWTH_TARGET)
-        print(f"exponent {summary['exponent']:.2f}, target {GROWTH_TARGET}: {met}")
+        wall, processor = (_exponent(rows, time) for time in ("within_s", "within_processor_s"))
+        summary |= {"exponent": wall, "exponent_processor": processor}
+        met = verdict(wall <= GROWTH_TARGET)
+        print(f"exponent {wall:.2f}, of processor time {processor:.2f}, target {GROWTH_TARGET}: {met}")
     memory = rows[-1]["peak_memory_gib"] * 2**30 / 1e9
     print(
         f"memory at {rows[-1]['vertices']}: {memory:.2f} GB, target {MEMORY_TARGET}: {verdict(memory < MEMORY_TARGET)}"
     )
     return summary
+
+
+def _exponent(rows: list[dict[str, object]], kind: str) -> float:
+    logs = torch.tensor([[math.log(row[key]) for row in rows] for key in ("vertices", kind)])
+    across, up = logs - logs.mean(1, keepdim=True)
+    return float((across * up).sum() / (across * across).sum())
 
 
 def verdict(met: bool) -> str:
@@ -263,17 +247,13 @@ def verdict(met: bool) -> str:
 
 def summarise(rows: list[dict[str, object]]) -> None:
     """Smallest ratios against the targets."""
-    over_paper = [TABLE[row["size"]].seconds / row["within_s"] for row in rows if row["size"] in TABLE]
-    over_lifted = [row["lifted"]["within_s"] / row["within_s"] for row in rows if row["lifted"]]
-    for name, ratios, target in (
-        ("lifted over ours", over_lifted, LIFTED_TARGET),
-        ("paper's printed time over ours", over_paper, PAPER_TARGET),
-    ):
-        if ratios:
-            reached = sum(ratio >= target for ratio in ratios)
-            print(
-                f"{name}: {min(ratios):.1f} to {max(ratios):.1f}, target {target:.0f}: {reached} of {len(ratios)} met"
-            )
+    for over, kind in (("within_s", "wall time"), ("within_processor_s", "processor time")):
+        paper = [TABLE[row["size"]].seconds / row[over] for row in rows if row["size"] in TABLE]
+        lifted = [row["lifted"][over] / row[over] for row in rows if row["lifted"]]
+        for name, ratios, target in (("lifted", lifted, LIFTED_TARGET), ("paper's printed time", paper, PAPER_TARGET)):
+            if ratios:
+                met = f"{sum(ratio >= target for ratio in ratios)} of {len(ratios)} met"
+                print(f"{name} over ours, {kind}: {min(ratios):.1f} to {max(ratios):.1f}, target {target:.0f}: {met}")
 
 
 def parse() -> argparse.Namespace:
@@ -293,7 +273,7 @@ def main() -> None:
     arguments = parse()
     torch.set_num_threads(arguments.threads)
     if arguments.child:
-        return child(arguments.child)
+        return child(arguments.child, arguments.repeats)
     start_load = os.getloadavg()
     print(
         f"{platform.processor() or platform.machine()}, {arguments.threads} threads, torch {torch.__version__}, ",
@@ -308,7 +288,7 @@ def main() -> None:
         rows.append(row)
         report(row, row["lifted"], TABLE.get(size))
     summarise(rows)
-    grown = growth(arguments.growth, arguments.threads) if arguments.growth else None
+    grown = growth(arguments.growth, arguments.repeats, arguments.threads) if arguments.growth else None
     print(f"load at the end {os.getloadavg()[0]:.1f}")
     if arguments.json:
         about = {"torchfair": torchfair.__version__, "torch": torch.__version__, "threads": arguments.threads}
