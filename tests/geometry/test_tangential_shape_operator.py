@@ -41,14 +41,11 @@ def test_symmetric_part_in_the_tangent_plane(choice, mesh):
     torch.testing.assert_close(bases.mT @ found @ bases, along @ (operators + operators.mT) / 2 @ along)
 
 
-@each_estimator
-def test_traces_lose_what_lies_along_the_normal(choice):
-    """tr W' = trace in the plane + n.W'n, so sum_e l sin a of the 3x3 operators is no longer met at sharp corners."""
-    vertices, topology = cube()
-    if choice["estimator"] == "normal_cycle":
-        strength = 0.5 if choice["sine"] else math.pi / 4  # the 3x3 operators are multiples of the identity
-        expected = strength * torch.eye(2, dtype=DOUBLE).expand(8, 2, 2)
-        torch.testing.assert_close(tangential_shape_operators(vertices, topology, **choice), expected)
+@pytest.mark.parametrize("sine", [True, False])
+def test_a_cube_corner_keeps_two_of_its_three_eigenvalues(sine):
+    strength = 0.5 if sine else math.pi / 4  # the 3x3 operators are multiples of the identity
+    expected = strength * torch.eye(2, dtype=DOUBLE).expand(8, 2, 2)
+    torch.testing.assert_close(tangential_shape_operators(*cube(), sine=sine), expected)
 
 
 @each_estimator
