@@ -169,6 +169,31 @@ def test_hybrid_roof_gets_smoother_near_the_original_with_planar_quads(run: Run,
     assert "0.21" in (tmp_path / "out" / "table.txt").read_text()  # the paper's row
 
 
+@pytest.mark.parametrize("name", ["cone", "tilted_circles"])
+def test_least_absolute_curvature_lies_below_that_of_surfaces_of_least_area_and_bending(
+    run: Run, tmp_path: Path, name: str
+) -> None:
+    options = ("--boundaries", name, "--vertices", "90", "--levels", "1", "--iterations", "15")
+    report = run("fig13_boundaries", *options)["boundaries"][name]
+    assert min(report["saved"].values()) > 0.03
+    assert abs(report["excess"]) < 0.03
+    if name == "cone":
+        assert report["largest_distance_from_hull"] < 5e-3
+        least, start = (report["surfaces"][key]["total_absolute_curvature"] for key in ("least C", "start"))
+        assert least < 0.6 * start
+    surfaces = report["surfaces"]
+    assert min(surfaces, key=lambda kind: surfaces[kind]["area"]) == "least area"
+    assert load_mesh(tmp_path / "out" / f"{name}_least_c.obj").topology.num_faces == report["faces"]
+
+
+def test_curvature_of_canopies_of_least_absolute_curvature_gathers_in_ridges(run: Run) -> None:
+    options = ("--canopies", "leaf", "--vertices", "120", "--levels", "1", "--iterations", "15")
+    report = run("fig16_canopies", *options)["canopies"]["leaf"]
+    assert min(report["saved"].values()) > 0.05
+    gathered = {kind: row["area_with_half_of_c"] for kind, row in report["surfaces"].items()}
+    assert min(gathered, key=lambda kind: gathered[kind]) == "least C"
+
+
 TRAINING = ("--rows", "8", "--columns", "8", "--points", "120", "--batch", "60", "--steps", "90", "--log-every", "30")
 
 
