@@ -12,6 +12,7 @@ from torchfair.constraints import (
     absolute_curvature_terms,
     along_directions,
     closeness_terms,
+    even_fairness_terms,
     interior_fairness_terms,
     tangent_plane_terms,
     tangential_fairness_terms,
@@ -22,6 +23,7 @@ from torchfair.errors import ShapeError
 from torchfair.geometry import umbrella_vectors, vertex_normals
 from torchfair.geometry.closest_point import ReferenceSurface
 from torchfair.projection.term import differentiate
+from torchfair.shapes import Cylinder, principal_triangles
 
 VERTICES, TOPOLOGY = wavy_grid(7, 6, triangles=True)
 
@@ -80,3 +82,26 @@ def test_tangential_fairness_is_the_tangential_part_of_umbrellas() -> None:
         torch.testing.assert_close(values, expected[centres], atol=1e-12, rtol=1e-9)
         seen += len(centres)
     assert seen == int((~TOPOLOGY.is_boundary_vertex).sum())
+
+
+def test_even_bending_is_left_in_peace_by_even_fairness() -> None:
+    """On a cylinder, whose umbrella vectors are alike, little is left to even out away from the boundary."""
+    mesh = principal_triangles(Cylinder(radius=1.0, height=3.0), 24, 20)
+    middle = (mesh.vertices[:, 2] - mesh.vertices[:, 2].mean()).abs() < 0.8
+    plain = umbrella_vectors(mesh.vertices, mesh.topology)[middle].norm(dim=1)
+    for term in even_fairness_terms(mesh.vertices, mesh.topology, weight=1.0):
+        values = term.values(term.arguments({"vertices": mesh.vertices}))
+        inside = middle[term.stencil[0][1][:, 0]]
+        # What is left is that the umbrella vectors around a vertex are turned against each other.
+        assert float(values[inside].norm(dim=1).max()) < 0.15 * float(plain.min())
+
+
+def test_even_fairness_removes_noise() -> None:
+    noise = 0.2 * torch.randn(VERTICES.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    rough = VERTICES + noise * (~TOPOLOGY.is_boundary_vertex)[:, None]
+    sizes = []
+    for vertices in (VERTICES, rough):
+        terms = even_fairness_terms(VERTICES, TOPOLOGY, weight=1.0)
+        sizes.append(sum(float(t.values(t.arguments({"vertices": vertices})).square().sum()) for t in terms))
+    assert sizes[1] > 1.2 * sizes[0]
+    assert all(term.linear for term in terms)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..geometry import vertex_normals
+from ..geometry import umbrella_vectors, vertex_normals
 from ..polylines import straight_triples
 from ..projection import ElementTerm
 from ..projection.layout import State
 from ..topology import Topology
+
+_ROUNDS = 3  # of averaging over neighbours
 
 
 def umbrella(x: Tensor) -> Tensor:
@@ -69,6 +71,53 @@ def tangential_fairness_terms(topology: Topology, *, weight: float, block: str =
         stencil = [(block, torch.cat([centres[:, None], ring], dim=1))]
         terms.append(ElementTerm("tangential fairness", tangential_umbrella, stencil, weight=weight, refresh=refresh))
     return terms
+
+
+def even_fairness_terms(
+    vertices: Tensor, topology: Topology, *, weight: float, block: str = "vertices"
+) -> list[ElementTerm]:
+    """Umbrella vectors of interior vertices held to the even part of those at ``vertices`` (V, 3).
+
+    The even part is the mean umbrella vector over the neighbourhood, three rings wide, without its tangential
+    part. So vertices are spread and stars kept from crumpling, but unlike plain umbrella vectors, which a tube
+    makes shorter by shrinking, an evenly bent surface is left in peace. The terms are linear: the even part does
+    not follow the state.
+    """
+    even = _even_umbrellas(vertices, topology)
+    return [
+        ElementTerm(
+            "fairness",
+            umbrella_offset,
+            [(block, torch.cat([centres[:, None], ring], dim=1))],
+            data=(even[centres],),
+            weight=weight,
+            linear=True,
+        )
+        for centres, ring in topology.rings_by_valence.values()
+    ]
+
+
+def umbrella_offset(x: Tensor, target: Tensor) -> Tensor:
+    """:func:`umbrella` minus a given vector."""
+    return umbrella(x) - target
+
+
+def _even_umbrellas(vertices: Tensor, topology: Topology) -> Tensor:
+    """(V, 3) normal parts of umbrella vectors, averaged over interior neighbours and the vertex, three times."""
+    normals = vertex_normals(vertices, topology)
+    umbrellas = umbrella_vectors(vertices, topology)
+    even = (umbrellas * normals).sum(1, keepdim=True) * normals
+    inner = (~topology.is_boundary_vertex)[:, None].to(even.dtype)
+    v, w = topology.edges.unbind(1)
+    count = _around(inner, v, w)
+    for _ in range(_ROUNDS):
+        even = _around(even * inner, v, w) / count.clamp_min(1.0)
+    return even
+
+
+def _around(values: Tensor, v: Tensor, w: Tensor) -> Tensor:
+    """Sum of the values (V, d) of every vertex and its neighbours."""
+    return values.index_add(0, v, values[w]).index_add(0, w, values[v])
 
 
 def _between_quads(topology: Topology) -> Tensor:

@@ -22,7 +22,7 @@ from .boundary_track import BoundaryTrack
 from .form_problem import FormProblem
 from .form_report import form_measures
 from .form_settings import FormSettings
-from .form_stages import solve_level, stopped
+from .form_stages import FormStages, stopped
 from .handles import read_handles
 
 
@@ -120,8 +120,7 @@ def minimise_absolute_curvature(
             normals = _refined_normals(normals, refinement)
             track = track.refined(refinement)
             current = track.positions(refinement.apply(current))
-        smoothings = settings.smoothings() if not level else settings.smoothings()[-2:]
-        solved = _solve(current, topology, track, normals, (pulled, targets), smoothings, settings, callback)
+        solved = _solve(current, topology, track, normals, (pulled, targets), settings, callback, nearby=level > 0)
         for moved, run in solved:
             current = moved
             stages.append(run)
@@ -141,9 +140,10 @@ def _solve(
     track: BoundaryTrack,
     normals: Tensor,
     handles: tuple[Tensor, Tensor],
-    smoothings: list[float],
     settings: FormSettings,
     callback: Callback | None,
+    *,
+    nearby: bool,
 ) -> Iterator[tuple[Tensor, ProjectionResult]]:
     """One level, in units of the input: the vertices after each stage, and the run."""
     triangles = topology
@@ -156,7 +156,9 @@ def _solve(
     def observe(state: Tensor) -> dict[str, float]:
         return {"total_absolute_curvature": normalisation.length * float(total_absolute_curvature(state, triangles))}
 
-    for moved, run in solve_level(problem, normalisation.apply(vertices), smoothings, callback, observe):
+    stages = FormStages(problem, callback, observe)
+    start = normalisation.apply(vertices)
+    for moved, run in stages.from_nearby(start) if nearby else stages.from_afar(start):
         yield torch.where(problem.fixed[:, None], vertices, normalisation.invert(moved)), run
 
 

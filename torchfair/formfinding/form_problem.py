@@ -8,7 +8,7 @@ from torch import Tensor
 from .. import constraints as c
 from ..constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks, lifted_absolute_curvature_terms
 from ..energies import total_absolute_curvature
-from ..geometry import face_normals, vertex_normals
+from ..geometry import corner_angles, face_normals, vertex_normals
 from ..geometry.closest_curve_point import ReferenceCurves
 from ..projection import ElementTerm
 from ..projection.layout import State
@@ -51,11 +51,12 @@ class FormProblem:
         gliding = settings.boundary == "glide"
         stays = topology.is_boundary_vertex & (track.corners | (not gliding))
         self.fixed = stays | (topology.valences == 0)
-        self._fairness = [
-            *c.interior_fairness_terms(topology, weight=settings.fairness_weight),
+        self._conditions = [
             *c.handle_terms(handles, targets, weight=settings.handle_weight),
             *self._tangent_planes(normals),
         ]
+        if settings.umbrella_weight:
+            self._conditions += c.interior_fairness_terms(topology, weight=settings.umbrella_weight)
         self._in_space = [*self._gliding(track, normalisation)] if gliding else []
         if settings.tangential_fairness_weight:
             self._in_space += c.tangential_fairness_terms(topology, weight=settings.tangential_fairness_weight)
@@ -75,9 +76,11 @@ class FormProblem:
         ways[self.handles] = torch.where(length > 0.0, pull / length, ways[self.handles])
         return ways
 
-    def height_terms(self, vertices: Tensor, directions: Tensor, smoothing: float) -> list[ElementTerm]:
+    def height_terms(
+        self, vertices: Tensor, directions: Tensor, smoothing: float, fairness_weight: float
+    ) -> list[ElementTerm]:
         """Terms whose unknowns are heights along the directions; the boundary stays."""
-        terms = [*self._curvature(smoothing), *self._fairness]
+        terms = [*self._curvature(smoothing), *self._fairness(vertices, fairness_weight), *self._conditions]
         return [c.along_directions(term, vertices, directions) for term in terms]
 
     # ---- vertices move in space ------------------------------------------------------------------------
@@ -88,18 +91,31 @@ class FormProblem:
             return {"vertices": vertices}
         return {"vertices": vertices, **lifted_absolute_curvature_blocks(vertices, self.topology)}
 
-    def terms(self, smoothing: float) -> list[ElementTerm]:
-        """Terms whose unknowns are the vertices, or those of the lifted formulation."""
+    def terms(self, vertices: Tensor, smoothing: float) -> list[ElementTerm]:
+        """Terms whose unknowns are the vertices, or those of the lifted formulation; ``vertices`` are the start."""
         settings = self.settings
+        others = [*self._fairness(vertices, settings.fairness_weight), *self._conditions, *self._in_space]
         if settings.formulation == "reduced":
-            return [*self._curvature(smoothing), *self._fairness, *self._in_space]
+            return [*self._curvature(smoothing), *others]
         lifted = lifted_absolute_curvature_terms(
             self.topology,
             smoothing=smoothing,
             weight=settings.curvature_weight,
             constraint_weight=settings.constraint_weight,
         )
-        return [*lifted, *self._fairness, *self._in_space]
+        return [*lifted, *others]
+
+    # ---- judging ---------------------------------------------------------------------------------------
+
+    def merit(self, vertices: Tensor, smoothing: float) -> float:
+        """Smoothed C, for comparing surfaces."""
+        arguments = [(term, term.arguments({"vertices": vertices})) for term in self._curvature(smoothing)]
+        return sum(float(term.contributions(data, term.values(data)).sum()) for term, data in arguments)
+
+    def has_collapsed(self, vertices: Tensor, start: Tensor) -> bool:
+        """Whether a corner angle is smaller than the settings allow and than half the smallest of the start."""
+        smallest, before = (float(corner_angles(x, self.topology).min()) for x in (vertices, start))
+        return smallest < min(self.settings.least_angle, 0.5 * before)
 
     def keeps_faces(self, state: State, trial: State) -> bool:
         """Whether no face turns over in a step."""
@@ -111,6 +127,9 @@ class FormProblem:
 
     def _curvature(self, smoothing: float) -> list[ElementTerm]:
         return c.absolute_curvature_terms(self.topology, smoothing=smoothing, weight=self.settings.curvature_weight)
+
+    def _fairness(self, vertices: Tensor, weight: float) -> list[ElementTerm]:
+        return c.even_fairness_terms(vertices, self.topology, weight=weight)
 
     def _tangent_planes(self, normals: Tensor) -> list[ElementTerm]:
         chosen = torch.nonzero((normals != 0.0).any(1) & self.topology.is_boundary_vertex).squeeze(1)

@@ -25,8 +25,11 @@ class FormSettings:
 
     Attributes:
         curvature_weight: Weight of C.
-        fairness_weight: Weight of squared umbrella vectors: keeps stars from crumpling, fades as edges shorten.
-        tangential_fairness_weight: Weight of their parts in the tangent planes, on top.
+        fairness_weight: Weight of squared differences of umbrella vectors from the even part of those around:
+            keeps stars from crumpling and vertices apart, fades as edges shorten.
+        coarse_fairness_weight: The same while smoothing is coarse.
+        umbrella_weight: Weight of squared umbrella vectors as they are (the paper's fairness): shrinks tubes.
+        tangential_fairness_weight: Weight of their parts in the tangent planes.
         boundary: ``"fixed"``, or ``"glide"`` to let boundary vertices slide along the boundary curves, corners
             kept.
         boundary_weight: Weight of the squared distance of gliding vertices from their curve.
@@ -35,6 +38,9 @@ class FormSettings:
         handle_weight: Weight of the squared distance of handles from their targets.
         coarse_smoothing, smoothing: Stars with less curvature than this fraction of the mean over all stars
             are treated as flat, at first and in the end; in between, by steps of about five.
+        least_angle: A surface found with the coarse smoothing that has a smaller corner angle than this, radians
+            (or half the smallest of the start), is suspected to have collapsed and sought once more with the
+            last smoothing alone; likewise one that has not converged.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables
             too (for comparison: slower).
         constraint_weight: Weight of the constraints that define auxiliary variables.
@@ -42,7 +48,9 @@ class FormSettings:
     """
 
     curvature_weight: float = 1.0
-    fairness_weight: float = 1.0
+    fairness_weight: float = 0.3
+    coarse_fairness_weight: float = 10.0
+    umbrella_weight: float = 0.0
     tangential_fairness_weight: float = 0.0
     boundary: str = "fixed"
     boundary_weight: float = 1e4
@@ -51,8 +59,9 @@ class FormSettings:
     handle_weight: float = 1e4
     coarse_smoothing: float = 1.5
     smoothing: float = 0.05
+    least_angle: float = math.radians(5.0)
     formulation: str = "reduced"
-    constraint_weight: float = 1e4
+    constraint_weight: float = 1e3
     projection: ProjectionSettings = field(default_factory=_default_projection)
 
     def __post_init__(self) -> None:

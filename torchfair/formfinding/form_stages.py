@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 
 import torch
 from torch import Tensor
@@ -13,38 +13,111 @@ from ..projection.layout import State
 from .form_problem import FormProblem
 
 Observe = Callable[[Tensor], dict[str, float]]
+Stage = tuple[Tensor, ProjectionResult]
 
 
-def solve_level(
-    problem: FormProblem, start: Tensor, smoothings: list[float], callback: Callback | None, observe: Observe
-) -> Iterator[tuple[Tensor, ProjectionResult]]:
-    """Runs stage after stage and gives the vertices after each; ends early when a stage was stopped.
+class FormStages:
+    """Runs stage after stage; every method gives the vertices after each, and ends early when a stage was stopped.
 
-    With decreasing smoothing the vertices first move along their normals, which are anew those of the surface in
-    each stage: a third of the unknowns, and little to go wrong. Then they move in space with the last smoothings,
-    which spreads them. The lifted formulation does only the latter.
+    Args:
+        problem: Of one level.
+        callback, observe: See :func:`~torchfair.projection.guided_projection`.
     """
-    vertices = start
-    reduced = problem.settings.formulation == "reduced"
-    for fraction in smoothings[:-1] if reduced else []:
-        vertices, run = _along_normals(problem, vertices, fraction, callback, observe)
-        yield vertices, run
-        if stopped(run):
+
+    def __init__(self, problem: FormProblem, callback: Callback | None, observe: Observe) -> None:
+        self.problem, self.callback, self.observe = problem, callback, observe
+
+    def from_afar(self, start: Tensor) -> Iterator[Stage]:
+        """From any start.
+
+        With decreasing smoothing the vertices first move along their normals, which are anew those of the surface
+        in each stage: a third of the unknowns, and little to go wrong. Then they move in space with the last
+        smoothings, which spreads them.
+
+        Coarse smoothing leads a long way, but it blurs what distinguishes a slender tube from a waisted one. So where
+        that has not converged or has collapsed, the last smoothing is tried from the start too, and the better
+        surface taken.
+        """
+        settings = self.problem.settings
+        smoothings = settings.smoothings()
+        if settings.formulation == "lifted":
+            yield from self._in_space(start, smoothings)
             return
-    for fraction in smoothings[-2:] if reduced else smoothings:
+        found = yield from _all(self._along_normals(start, smoothings[:-1], settings.coarse_fairness_weight))
+        if stopped(found[-1][1]):
+            return
+        if self._is_doubtful(found, start):
+            fine = yield from _all(self._along_normals(start, smoothings[-1:], settings.fairness_weight))
+            if stopped(fine[-1][1]):
+                return
+            if self._is_better(fine[-1][0], found[-1][0], start):
+                yield from self._in_space(fine[-1][0], smoothings[-1:])
+                return
+        yield from self._in_space(found[-1][0], smoothings[-2:])
+
+    def from_nearby(self, start: Tensor) -> Iterator[Stage]:
+        """From a refined solution: with the last smoothing only."""
+        last = self.problem.settings.smoothings()[-1:]
+        if self.problem.settings.formulation == "reduced":
+            found = yield from _all(self._along_normals(start, last, self.problem.settings.fairness_weight))
+            start = found[-1][0]
+            if stopped(found[-1][1]):
+                return
+        yield from self._in_space(start, last)
+
+    def _is_doubtful(self, found: Sequence[Stage], start: Tensor) -> bool:
+        converged = all(run.status.converged for _, run in found)
+        return not converged or self.problem.has_collapsed(found[-1][0], start)
+
+    def _is_better(self, surface: Tensor, other: Tensor, start: Tensor) -> bool:
+        problem = self.problem
+        collapsed = [problem.has_collapsed(x, start) for x in (surface, other)]
+        if collapsed[0] != collapsed[1]:
+            return collapsed[1]
+        smoothing = problem.smoothing(other, problem.settings.smoothing)
+        return problem.merit(surface, smoothing) < problem.merit(other, smoothing)
+
+    def _in_space(self, vertices: Tensor, smoothings: Sequence[float]) -> Iterator[Stage]:
+        problem = self.problem
+        for fraction in smoothings:
+            run = guided_projection(
+                problem.blocks(vertices),
+                problem.terms(vertices, problem.smoothing(vertices, fraction)),
+                fixed={"vertices": problem.fixed},
+                settings=problem.settings.projection,
+                callback=self.callback,
+                observe=lambda state: self.observe(state["vertices"]),
+                guard=problem.keeps_faces,
+            )
+            vertices = run.blocks["vertices"]
+            yield vertices, run
+            if stopped(run):
+                return
+
+    def _along_normals(self, vertices: Tensor, smoothings: Sequence[float], fairness: float) -> Iterator[Stage]:
+        for fraction in smoothings:
+            vertices, run = self._one_along_normals(vertices, fraction, fairness)
+            yield vertices, run
+            if stopped(run):
+                return
+
+    def _one_along_normals(self, base: Tensor, fraction: float, fairness: float) -> Stage:
+        problem = self.problem
+        directions = problem.directions(base)
+
+        def place(state: State) -> Tensor:
+            return base + state["heights"] * directions
+
         run = guided_projection(
-            problem.blocks(vertices),
-            problem.terms(problem.smoothing(vertices, fraction)),
-            fixed={"vertices": problem.fixed},
+            {"heights": torch.zeros(base.shape[0], 1, dtype=base.dtype)},
+            problem.height_terms(base, directions, problem.smoothing(base, fraction), fairness),
+            fixed={"heights": problem.topology.is_boundary_vertex | problem.fixed},
             settings=problem.settings.projection,
-            callback=callback,
-            observe=lambda state: observe(state["vertices"]),
-            guard=problem.keeps_faces,
+            callback=self.callback,
+            observe=lambda state: self.observe(place(state)),
+            guard=lambda state, trial: problem.keeps_faces({"vertices": place(state)}, {"vertices": place(trial)}),
         )
-        vertices = run.blocks["vertices"]
-        yield vertices, run
-        if stopped(run):
-            return
+        return place(run.blocks), run
 
 
 def stopped(run: ProjectionResult) -> bool:
@@ -52,21 +125,10 @@ def stopped(run: ProjectionResult) -> bool:
     return run.status in (Status.INTERRUPTED, Status.CALLBACK)
 
 
-def _along_normals(
-    problem: FormProblem, base: Tensor, fraction: float, callback: Callback | None, observe: Observe
-) -> tuple[Tensor, ProjectionResult]:
-    directions = problem.directions(base)
-
-    def place(state: State) -> Tensor:
-        return base + state["heights"] * directions
-
-    run = guided_projection(
-        {"heights": torch.zeros(base.shape[0], 1, dtype=base.dtype)},
-        problem.height_terms(base, directions, problem.smoothing(base, fraction)),
-        fixed={"heights": problem.topology.is_boundary_vertex | problem.fixed},
-        settings=problem.settings.projection,
-        callback=callback,
-        observe=lambda state: observe(place(state)),
-        guard=lambda state, trial: problem.keeps_faces({"vertices": place(state)}, {"vertices": place(trial)}),
-    )
-    return place(run.blocks), run
+def _all(stages: Iterator[Stage]) -> Generator[Stage, None, list[Stage]]:
+    """Hands stages on; the value of ``yield from`` is the list of them."""
+    seen = []
+    for stage in stages:
+        seen.append(stage)
+        yield stage
+    return seen
