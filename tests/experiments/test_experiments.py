@@ -194,6 +194,16 @@ def test_curvature_of_canopies_of_least_absolute_curvature_gathers_in_ridges(run
     assert min(gathered, key=lambda kind: gathered[kind]) == "least C"
 
 
+def test_boundary_and_tangent_planes_give_patches_of_cylinder_and_cone_back(run: Run) -> None:
+    report = run("fig15_tangent_planes", "--vertices", "120", "--levels", "0", "--designs", "pipe")
+    for patch in report["patches"].values():
+        assert patch["largest_distance"] < 0.05 * patch["start_distance"]
+        assert abs(patch["excess"]) < 0.05
+    kinds = report["designs"]["pipe"]["kinds"]
+    by_angles = {kind: row["total_absolute_curvature_by_angles"] for kind, row in kinds.items()}
+    assert by_angles["prescribed"] > 1.3 * by_angles["free"]
+
+
 TRAINING = ("--rows", "8", "--columns", "8", "--points", "120", "--batch", "60", "--steps", "90", "--log-every", "30")
 
 
