@@ -39,6 +39,11 @@ _ROWS = {
     "isolated_vertices": "vertices without a face (not judged)",
 }
 
+_PATTERNS = (
+    ("saddles by edges above and below their best plane", "saddle_patterns"),
+    ("inner vertices by edges above and below the plane at the vertex normal", "ordinary_patterns"),
+)
+
 
 def add_parser(subparsers: Any) -> None:
     """Adds ``diagnose`` to the commands."""
@@ -118,8 +123,7 @@ def format_counts(numbers: dict[str, Any]) -> str:
     crossings, between = numbers["gauss_image_crossings"], numbers["gauss_image_crossings_between_stars"]
     words = "not counted" if crossings is None else f"{crossings:>9}  ({between} of them between different stars)"
     lines.append(f"  {'crossings in the whole Gauss image':<{width}}  {words}")
-    for title, key in (("saddles by edges above and below their best plane", "saddle_patterns"),
-                       ("inner vertices by edges above and below the plane at the vertex normal", "ordinary_patterns")):  # fmt: skip
+    for title, key in _PATTERNS:
         shown = list(numbers[key].items())
         if shown:
             more = f", {len(shown) - 8} other patterns" if len(shown) > 8 else ""

@@ -10,7 +10,7 @@ from torch import Tensor
 from ..projection import ElementTerm
 from ..projection.layout import State
 from ..stars._groups import star_groups
-from ..stars._saddle_targets import saddle_targets, star_shape
+from ..stars._saddle_targets import saddle_planes, saddle_sides, star_shape
 from ..stars.pyramid_penalty import crossing_depths
 from ..stars.saddle_penalty import saddle_defects, saddle_groups
 from ..topology import Topology
@@ -39,11 +39,21 @@ def pyramid_terms(topology: Topology, *, weight: float, block: str = "vertices")
 
 
 def saddle_terms(
-    topology: Topology, saddles: Tensor, *, weight: float, margin: float = 0.0, block: str = "vertices"
+    vertices: Tensor,
+    topology: Topology,
+    saddles: Tensor,
+    *,
+    weight: float,
+    margin: float = 0.0,
+    block: str = "vertices",
 ) -> list[ElementTerm]:
     """Amounts by which the stars of ``saddles`` miss being good saddles; zero, and silent, for good ones.
 
+    Which edges shall be above the plane and which below is decided for ``vertices`` and kept, so that the merit is
+    continuous; make the terms anew to decide again. The planes follow the state.
+
     Args:
+        vertices: (V, 3), the start.
         topology: Any polygon mesh.
         saddles: (V,) bool, inner vertices with 4 to 16 edges.
         weight: Dimensionless.
@@ -61,14 +71,20 @@ def saddle_terms(
     terms = []
     for group in saddle_groups(topology, saddles):
         stencil = torch.cat([group.centres[:, None], group.ring], dim=1)
-        refresh = _targets_of(block, stencil, group.patterns)
+        sides = saddle_sides(_arms(vertices.detach(), stencil), group.patterns)
+        refresh = _planes_of(block, stencil, sides, margin)
         terms.append(ElementTerm("good saddles", miss, [(block, stencil)], weight=weight, refresh=refresh))
     return terms
 
 
-def _targets_of(block: str, stencil: Tensor, patterns: Tensor) -> Callable[[State], tuple[Tensor, Tensor]]:
+def _arms(vertices: Tensor, stencil: Tensor) -> Tensor:
+    """Arms (n, k, 3) of stars given as (n, k + 1) vertex numbers, centre first."""
+    stars = vertices[stencil]
+    return stars[:, 1:] - stars[:, :1]
+
+
+def _planes_of(block: str, stencil: Tensor, sides: Tensor, margin: float) -> Callable[[State], tuple[Tensor, Tensor]]:
     def refresh(state: State) -> tuple[Tensor, Tensor]:
-        stars = state[block][stencil]
-        return saddle_targets(stars[:, 1:] - stars[:, :1], patterns)
+        return sides, saddle_planes(_arms(state[block], stencil), sides, margin)
 
     return refresh

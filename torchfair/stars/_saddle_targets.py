@@ -15,7 +15,8 @@ from ._patterns import four_run_patterns
 LEAST_EDGES, MOST_TARGET_EDGES = 4, 16
 """Valences of the stars that have a target: with three edges nothing is a saddle, with many the patterns explode."""
 
-_STEPS = 6
+_STEPS = 8
+_BENDS = 0.01
 
 
 class StarShape(NamedTuple):
@@ -51,25 +52,48 @@ def good_patterns(valence: int) -> Tensor:
     return signs.to(torch.float64)
 
 
-def saddle_targets(arms: Tensor, patterns: Tensor) -> tuple[Tensor, Tensor]:
-    """Sides (n, k) and unit normals (n, 3) for stars with arms (n, k, 3); ``patterns`` are :func:`good_patterns`.
+def saddle_sides(arms: Tensor, patterns: Tensor) -> Tensor:
+    """Sides (n, k) that the edges of stars with arms (n, k, 3) have or should have; ``patterns``: :func:`good_patterns`.
 
-    For a good saddle: the sides that its convex and concave edges demand, and the normal of a plane that has
-    them. For any other star: the pattern that its edges and the plane of its mean normal violate least, and the
-    plane that violates it least. Both are constants for derivatives.
+    For a good saddle those that its convex and concave edges demand. For any other star the pattern that its
+    edges, and the plane of its mean normal, violate least.
     """
-    shape = StarShape(*(part.detach() for part in star_shape(arms.detach())))
+    shape = _fixed_shape(arms)
     table = patterns.to(shape.bends)
-    mean = normalise(cross(arms.detach(), arms.detach().roll(-1, 1)).sum(1), 0.0)
-    heights = dot(shape.arms, mean[:, None])
     costs = _violation(shape.bends, table)
     nearest = table[costs.argmin(1)]
-    walls = torch.cat([shape.arms * nearest[..., None], shape.sectors], dim=1)
-    planes, margins = interior_directions(walls)
+    _, margins = interior_directions(_walls(shape, nearest))
     is_good = (costs.amin(1) == 0) & (margins > 0)
-    wanted = table[(costs + _violation(heights, table)).argmin(1)]
-    fitted = _fit_plane(shape, wanted, mean, heights)
-    return torch.where(is_good[:, None], nearest, wanted), torch.where(is_good[:, None], planes, fitted)
+    heights = dot(shape.arms, _mean_normal(arms)[:, None])
+    wanted = table[(_BENDS * costs + _violation(heights, table)).argmin(1)]
+    return torch.where(is_good[:, None], nearest, wanted)
+
+
+def saddle_planes(arms: Tensor, sides: Tensor, margin: float = 0.0) -> Tensor:
+    """Unit normals (n, 3) of the planes for which edges miss their ``sides`` (n, k), by ``margin``, least.
+
+    Where some plane misses none, it is one of those. Being the minimiser, the normal may be held constant when
+    the sum of the squared defects is differentiated.
+    """
+    shape = _fixed_shape(arms)
+    inside, margins = interior_directions(_walls(shape, sides))
+    mean = _mean_normal(arms)
+    clearance = 0.3 * dot(shape.arms, mean[:, None]).abs().mean(1, keepdim=True)
+    near = _fit_plane(shape, sides, mean, clearance)
+    start = torch.where((margins > 0)[:, None], inside, near)
+    return _fit_plane(shape, sides, start, torch.full_like(clearance, margin))
+
+
+def _fixed_shape(arms: Tensor) -> StarShape:
+    return StarShape(*(part.detach() for part in star_shape(arms.detach())))
+
+
+def _mean_normal(arms: Tensor) -> Tensor:
+    return normalise(cross(arms.detach(), arms.detach().roll(-1, 1)).sum(1), 0.0)
+
+
+def _walls(shape: StarShape, sides: Tensor) -> Tensor:
+    return torch.cat([shape.arms * sides[..., None], shape.sectors], dim=1)
 
 
 def _violation(values: Tensor, table: Tensor) -> Tensor:
@@ -78,19 +102,20 @@ def _violation(values: Tensor, table: Tensor) -> Tensor:
     return below @ (table > 0).to(values).T + above @ (table < 0).to(values).T
 
 
-def _fit_plane(shape: StarShape, sides: Tensor, mean: Tensor, heights: Tensor) -> Tensor:
-    """Normal (n, 3) near ``mean`` for which edges are on their ``sides`` or, if that cannot be, nearly so.
+def _fit_plane(shape: StarShape, sides: Tensor, start: Tensor, clearance: Tensor) -> Tensor:
+    """Normal (n, 3) near ``start`` at which the squares of what edges lack of ``clearance`` (n, 1) are least in sum.
 
-    Gauss-Newton steps on the squared distances by which edges miss their side with some clearance.
+    The sum is convex and piecewise quadratic in the normal but for its length: Gauss-Newton steps end after a few.
     """
-    flat = shape.arms - heights[..., None] * mean[:, None]
-    clearance = 0.3 * heights.abs().mean(1, keepdim=True)
-    tilt = torch.zeros_like(mean)
-    identity = torch.eye(3, dtype=mean.dtype, device=mean.device)
+    ridge = max(1e-9, 1e3 * torch.finfo(start.dtype).eps)  # keeps stars that leave the normal open solvable
+    identity = ridge * torch.eye(3, dtype=start.dtype, device=start.device)
+    normal = start
     for _ in range(_STEPS):
-        missed = (clearance - sides * (heights + dot(flat, tilt[:, None]))).clamp_min(0)
+        heights = dot(shape.arms, normal[:, None])
+        missed = (clearance - sides * heights).clamp_min(0)
+        flat = shape.arms - heights[..., None] * normal[:, None]
         rows = flat * (missed > 0).to(flat)[..., None]
-        matrix = rows.transpose(1, 2) @ rows + 1e-3 * identity
+        matrix = rows.transpose(1, 2) @ rows + normal[:, :, None] * normal[:, None, :] + identity
         right = ((sides * missed)[..., None] * rows).sum(1)
-        tilt = tilt + torch.linalg.solve_ex(matrix, right[..., None])[0].squeeze(-1)
-    return normalise(mean + tilt, 0.0)
+        normal = normalise(normal + torch.linalg.solve_ex(matrix, right[..., None])[0].squeeze(-1), 0.0)
+    return normal

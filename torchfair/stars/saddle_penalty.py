@@ -12,7 +12,7 @@ from ..errors import MeshError, ShapeError
 from ..geometry._ops import dot, gather
 from ..topology import Topology
 from ._groups import star_groups
-from ._saddle_targets import LEAST_EDGES, MOST_TARGET_EDGES, good_patterns, saddle_targets, star_shape
+from ._saddle_targets import LEAST_EDGES, MOST_TARGET_EDGES, good_patterns, saddle_planes, saddle_sides, star_shape
 
 
 class SaddleGroup(NamedTuple):
@@ -51,10 +51,10 @@ def saddle_penalty(vertices: Tensor, topology: Topology, saddles: Tensor | None 
     """Sum over stars of the squared amounts by which they miss being good saddles.
 
     Zero if every chosen star is a good saddle as :func:`~torchfair.stars.classify_stars` defines it, positive if
-    one is not; stars on the border between the two, such as flat ones, count zero. For each star the side of the
-    plane on which each edge belongs and the plane itself are chosen anew at every call, exactly for good saddles
-    and by the least violation for others, and are constants for derivatives; see :func:`saddle_defects` for what
-    is summed.
+    one is not; stars on the border between the two, such as flat ones, count zero. For each star the sides on
+    which edges belong are chosen at every call, exactly for good saddles and by the least violation for others, and
+    the plane is the one with the least penalty, so that it may be held constant for first derivatives; see
+    :func:`saddle_defects` for what is summed.
 
     Args:
         vertices: positions (*batch, V, 3), any length unit.
@@ -133,7 +133,9 @@ def _per_vertex(vertices: Tensor, topology: Topology, groups: list[SaddleGroup])
     for centres, ring, patterns in groups:
         arms = gather(vertices, ring) - gather(vertices, centres)[..., None, :]
         size = ring.shape[1]
-        sides, normals = saddle_targets(arms.reshape(-1, size, 3), patterns)
-        sides, normals = sides.reshape(*arms.shape[:-1]), normals.reshape(*arms.shape[:-2], 3)
+        flat = arms.reshape(-1, size, 3)
+        sides = saddle_sides(flat, patterns)
+        normals = saddle_planes(flat, sides).reshape(*arms.shape[:-2], 3)
+        sides = sides.reshape(arms.shape[:-1])
         total = total.index_add(-1, centres, saddle_defects(arms, sides, normals).square().sum(-1))
     return total
