@@ -99,18 +99,21 @@ def _relaxed(vertices: Tensor, topology: Topology, terms: list[ElementTerm], ite
 
 
 def _area_vector(x: Tensor) -> Tensor:
-    return 0.5 * cross(x[1] - x[0], x[2] - x[0])
+    vector: Tensor = 0.5 * cross(x[1] - x[0], x[2] - x[0])
+    return vector
 
 
 def _closed_bend(x: Tensor) -> Tensor:
     """Shape operator of a star over the root of its area, whose square integrates k1^2 + k2^2."""
     spokes = x[1:] - x[0]
-    return closed_star(x) / (vector_norm(cross(spokes, spokes.roll(-1, 0)), dim=1).sum() / 6.0).sqrt()
+    bend: Tensor = closed_star(x) / (vector_norm(cross(spokes, spokes.roll(-1, 0)), dim=1).sum() / 6.0).sqrt()
+    return bend
 
 
 def _open_bend(x: Tensor) -> Tensor:
     spokes = x[1:] - x[0]
-    return open_star(x) / (vector_norm(cross(spokes[:-1], spokes[1:]), dim=1).sum() / 6.0).sqrt()
+    bend: Tensor = open_star(x) / (vector_norm(cross(spokes[:-1], spokes[1:]), dim=1).sum() / 6.0).sqrt()
+    return bend
 
 
 def developable_hull(curves: Sequence[ClosedCurve], points: int = 720) -> Mesh:
