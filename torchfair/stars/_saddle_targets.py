@@ -53,7 +53,9 @@ def good_patterns(valence: int) -> Tensor:
 
 
 def saddle_sides(arms: Tensor, patterns: Tensor) -> Tensor:
-    """Sides (n, k) that the edges of stars with arms (n, k, 3) have or should have; ``patterns``: :func:`good_patterns`.
+    """Sides (n, k) that the edges of stars with arms (n, k, 3) have or should have.
+
+    The ``patterns`` (P, k) to choose from are those of :func:`good_patterns`.
 
     For a good saddle those that its convex and concave edges demand. For any other star the pattern that its
     edges, and the plane of its mean normal, violate least.
