@@ -16,7 +16,6 @@ LEAST_EDGES, MOST_TARGET_EDGES = 4, 16
 """Valences of the stars that have a target: with three edges nothing is a saddle, with many the patterns explode."""
 
 _STEPS = 8
-_BENDS = 0.01
 
 
 class StarShape(NamedTuple):
@@ -67,7 +66,7 @@ def saddle_sides(arms: Tensor, patterns: Tensor) -> Tensor:
     _, margins = interior_directions(_walls(shape, nearest))
     is_good = (costs.amin(1) == 0) & (margins > 0)
     heights = dot(shape.arms, _mean_normal(arms)[:, None])
-    wanted = table[(_BENDS * costs + _violation(heights, table)).argmin(1)]
+    wanted = table[(costs + _violation(heights, table)).argmin(1)]
     return torch.where(is_good[:, None], nearest, wanted)
 
 
