@@ -17,4 +17,5 @@ from .normal_variation import normal_variation_terms as normal_variation_terms
 from .planarity import planarity_terms as planarity_terms
 from .stars import pyramid_terms as pyramid_terms
 from .stars import saddle_terms as saddle_terms
+from .tangent_planes import BoundaryNormals as BoundaryNormals
 from .tangent_planes import tangent_plane_terms as tangent_plane_terms

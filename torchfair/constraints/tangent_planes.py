@@ -2,12 +2,72 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 from torch.linalg import cross, vector_norm
 
+from ..geometry import face_area_vectors
+from ..geometry._ops import scatter_sum
 from ..projection import ElementTerm
 from ..topology import Topology
+
+_LARGEST_SHARE = 0.8
+
+
+class BoundaryNormals(NamedTuple):
+    """What normals at the boundary of a mesh look like from inside.
+
+    The normal of an open star is that of the surface near the centroid of its faces, not at the boundary vertex.
+    Along a line from the boundary inwards normals change linearly to first order, so the normal at the boundary is
+    ``(star - share * inner) / (1 - share)``.
+
+    Attributes:
+        star: (V, 3) unit normals of the sums of area vectors around vertices.
+        inner: (V, 3) mean of the star normals of neighbours inside.
+        share: (V,) how far the centroid of the star is on the way to them, 0 to 0.8; 0 where there are none.
+    """
+
+    star: Tensor
+    inner: Tensor
+    share: Tensor
+
+    @classmethod
+    def of(cls, vertices: Tensor, topology: Topology) -> BoundaryNormals:
+        """Those of one mesh (V, 3)."""
+        count = topology.num_vertices
+        areas = face_area_vectors(vertices, topology)
+        star = _unit(scatter_sum(areas[topology.corner_faces], topology.corners, count))
+        inside = (~topology.is_boundary_vertex)[:, None].to(vertices.dtype)
+        v, w = topology.edges.unbind(1)
+        ends, others = torch.cat([v, w]), torch.cat([w, v])
+
+        def mean_inside(values: Tensor) -> Tensor:
+            total = scatter_sum((values * inside)[others], ends, count)
+            return total / scatter_sum(inside[others], ends, count).clamp_min(1.0)
+
+        inwards = mean_inside(vertices) - vertices
+        inwards = inwards - _along(inwards, _boundary_chords(vertices, topology))
+        sizes = vector_norm(areas, dim=1, keepdim=True)
+        corners = topology.corner_faces
+        centres = scatter_sum(vertices[topology.corners], corners, topology.num_faces)
+        centres = centres / topology.face_sizes[:, None]
+        total = scatter_sum(sizes[corners], topology.corners, count).clamp_min(1e-300)
+        centroid = scatter_sum((sizes * centres)[corners], topology.corners, count) / total - vertices
+        share = (centroid * inwards).sum(1) / (inwards * inwards).sum(1).clamp_min(1e-300)
+        has_inside = scatter_sum(inside[others], ends, count)[:, 0] > 0
+        share = torch.where(has_inside, share.clamp(0.0, _LARGEST_SHARE), torch.zeros_like(share))
+        return cls(star, mean_inside(star), share)
+
+    def at_boundary(self) -> Tensor:
+        """(V, 3) unit normals extrapolated to the vertices."""
+        return _unit(self.star - self.share[:, None] * self.inner)
+
+    def star_targets(self, normals: Tensor) -> Tensor:
+        """(V, 3) unit star normals that belong to prescribed unit ``normals`` (V, 3) at the vertices."""
+        share = self.share[:, None]
+        return _unit((1.0 - share) * normals + share * self.inner)
 
 
 def tilt(x: Tensor, first: Tensor, second: Tensor) -> Tensor:
@@ -27,12 +87,12 @@ def tangent_plane_terms(
     """Turns the stars of boundary ``vertices`` (n,) until their normals are ``normals`` (n, 3), unit vectors.
 
     The residual is an angle in radians (its sine); opposite normals are not told apart, so the start must be
-    on the right side.
+    on the right side. Normals of stars differ from those at their vertices, see :class:`BoundaryNormals`.
 
     Args:
         topology: Triangle mesh.
         vertices: Numbers of boundary vertices.
-        normals: Unit normals of the prescribed planes.
+        normals: Unit normals of stars.
         weight: Dimensionless.
         block: Name of the vertex block.
     """
@@ -55,3 +115,21 @@ def tangent_frames(normals: Tensor) -> tuple[Tensor, Tensor]:
     first = cross(normals, helper)
     first = first / vector_norm(first, dim=1, keepdim=True)
     return first, cross(normals, first)
+
+
+def _boundary_chords(vertices: Tensor, topology: Topology) -> Tensor:
+    """(V, 3) from the previous to the next boundary vertex; zero inside."""
+    start, end = topology.boundary_edges.unbind(1)
+    edges = vertices[end] - vertices[start]
+    return scatter_sum(torch.cat([edges, edges]), torch.cat([start, end]), topology.num_vertices)
+
+
+def _along(vectors: Tensor, axes: Tensor) -> Tensor:
+    """Parts of vectors along axes of any length; zero where an axis is."""
+    squared = (axes * axes).sum(1, keepdim=True)
+    return (vectors * axes).sum(1, keepdim=True) / torch.where(squared > 0, squared, 1.0) * axes
+
+
+def _unit(vectors: Tensor) -> Tensor:
+    unit: Tensor = vectors / vector_norm(vectors, dim=1, keepdim=True).clamp_min(1e-300)
+    return unit

@@ -17,6 +17,8 @@ from ..topology import Topology
 from .boundary_track import BoundaryTrack
 from .form_settings import FormSettings
 
+_EVENED = 0.2  # of the extent of the mesh
+_LEAST_LENGTH = 1e-2  # of a mean of unit normals that still has a direction
 _LEAST_SMOOTHING = 1e-4  # mean edge lengths: where a flat start has nothing to measure it by
 
 
@@ -51,10 +53,8 @@ class FormProblem:
         gliding = settings.boundary == "glide"
         stays = topology.is_boundary_vertex & (track.corners | (not gliding))
         self.fixed = stays | (topology.valences == 0)
-        self._conditions = [
-            *c.handle_terms(handles, targets, weight=settings.handle_weight),
-            *self._tangent_planes(normals),
-        ]
+        self.normals = normals
+        self._conditions = c.handle_terms(handles, targets, weight=settings.handle_weight)
         if settings.umbrella_weight:
             self._conditions += c.interior_fairness_terms(topology, weight=settings.umbrella_weight)
         self._in_space = [*self._gliding(track, normalisation)] if gliding else []
@@ -69,8 +69,11 @@ class FormProblem:
     # ---- vertices move along normals -------------------------------------------------------------------
 
     def directions(self, vertices: Tensor) -> Tensor:
-        """(V, 3) vertex normals; towards their targets at handles."""
-        ways = vertex_normals(vertices, self.topology)
+        """(V, 3) vertex normals, evened out over a fifth of the mesh; towards their targets at handles.
+
+        Raw normals of a mesh that is not smooth yet cross each other and would drive vertices together.
+        """
+        ways = self._smoothed(vertex_normals(vertices, self.topology))
         pull = self.targets - vertices[self.handles]
         length = torch.linalg.vector_norm(pull, dim=1, keepdim=True)
         ways[self.handles] = torch.where(length > 0.0, pull / length, ways[self.handles])
@@ -80,8 +83,24 @@ class FormProblem:
         self, vertices: Tensor, directions: Tensor, smoothing: float, fairness_weight: float
     ) -> list[ElementTerm]:
         """Terms whose unknowns are heights along the directions; the boundary stays."""
-        terms = [*self._curvature(smoothing), *self._fairness(vertices, fairness_weight), *self._conditions]
+        terms = [*self._curvature(smoothing), *self._others(vertices, fairness_weight)]
         return [c.along_directions(term, vertices, directions) for term in terms]
+
+    def _smoothed(self, normals: Tensor) -> Tensor:
+        """Unit vectors ``d`` with ``(I + (f sqrt(V))^2 / 6 L) d ~ n``, L the graph Laplacian."""
+        from scipy.sparse import coo_array, diags_array, eye_array
+        from scipy.sparse.linalg import splu
+
+        size = self.topology.num_vertices
+        v, w = self.topology.edges.numpy().T
+        graph = coo_array((torch.ones(len(v)).double().numpy(), (v, w)), shape=(size, size)).tocsr()
+        graph = graph + graph.T
+        laplacian = diags_array(graph.sum(axis=1)) - graph
+        reach = (_EVENED * size**0.5) ** 2 / 6.0
+        smooth = splu((eye_array(size) + reach * laplacian).tocsc()).solve(normals.numpy())
+        found = torch.from_numpy(smooth)
+        length = torch.linalg.vector_norm(found, dim=1, keepdim=True)
+        return torch.where(length > _LEAST_LENGTH, found / length.clamp_min(_LEAST_LENGTH), normals)
 
     # ---- vertices move in space ------------------------------------------------------------------------
 
@@ -94,7 +113,7 @@ class FormProblem:
     def terms(self, vertices: Tensor, smoothing: float) -> list[ElementTerm]:
         """Terms whose unknowns are the vertices, or those of the lifted formulation; ``vertices`` are the start."""
         settings = self.settings
-        others = [*self._fairness(vertices, settings.fairness_weight), *self._conditions, *self._in_space]
+        others = [*self._others(vertices, settings.fairness_weight), *self._in_space]
         if settings.formulation == "reduced":
             return [*self._curvature(smoothing), *others]
         lifted = lifted_absolute_curvature_terms(
@@ -104,6 +123,11 @@ class FormProblem:
             constraint_weight=settings.constraint_weight,
         )
         return [*lifted, *others]
+
+    @property
+    def has_tangent_planes(self) -> bool:
+        """Whether normals are prescribed."""
+        return bool((self.normals != 0.0).any())
 
     # ---- judging ---------------------------------------------------------------------------------------
 
@@ -128,12 +152,20 @@ class FormProblem:
     def _curvature(self, smoothing: float) -> list[ElementTerm]:
         return c.absolute_curvature_terms(self.topology, smoothing=smoothing, weight=self.settings.curvature_weight)
 
-    def _fairness(self, vertices: Tensor, weight: float) -> list[ElementTerm]:
-        return c.even_fairness_terms(vertices, self.topology, weight=weight)
+    def _others(self, vertices: Tensor, fairness_weight: float) -> list[ElementTerm]:
+        """Fairness and conditions, the former and tangent planes as seen from ``vertices``."""
+        return [
+            *c.even_fairness_terms(vertices, self.topology, weight=fairness_weight),
+            *self._conditions,
+            *self._tangent_planes(vertices),
+        ]
 
-    def _tangent_planes(self, normals: Tensor) -> list[ElementTerm]:
-        chosen = torch.nonzero((normals != 0.0).any(1) & self.topology.is_boundary_vertex).squeeze(1)
-        return c.tangent_plane_terms(self.topology, chosen, normals[chosen], weight=self.settings.tangent_weight)
+    def _tangent_planes(self, vertices: Tensor) -> list[ElementTerm]:
+        chosen = torch.nonzero((self.normals != 0.0).any(1)).squeeze(1)
+        if not chosen.numel():
+            return []
+        targets = c.BoundaryNormals.of(vertices, self.topology).star_targets(self.normals)
+        return c.tangent_plane_terms(self.topology, chosen, targets[chosen], weight=self.settings.tangent_weight)
 
     def _gliding(self, track: BoundaryTrack, normalisation: Normalisation) -> list[ElementTerm]:
         lines, closed = track.polylines()

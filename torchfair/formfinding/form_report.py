@@ -7,6 +7,7 @@ import math
 import torch
 from torch import Tensor
 
+from ..constraints import BoundaryNormals
 from ..energies import (
     angle_variation,
     normal_variation,
@@ -14,8 +15,7 @@ from ..energies import (
     total_frobenius_curvature,
     total_mean_curvature,
 )
-from ..geometry import corner_angles, edge_lengths, face_area_vectors, face_areas
-from ..geometry._ops import scatter_sum
+from ..geometry import corner_angles, edge_lengths, face_areas
 from ..topology import Topology
 
 
@@ -27,7 +27,7 @@ def form_measures(
     Returns:
         ``total_absolute_curvature``, ``total_frobenius_curvature``, ``normal_variation``, ``angle_variation``,
         ``total_mean_curvature`` (length), ``area``, ``mean_edge_length``, ``smallest_angle_degrees``,
-        ``largest_tilt_degrees`` between prescribed and actual normals of boundary stars, and
+        ``largest_tilt_degrees`` between prescribed normals and those at the boundary (:class:`BoundaryNormals`), and
         ``largest_handle_distance``.
     """
     gaps = torch.linalg.vector_norm(vertices[handles] - targets, dim=1)
@@ -46,11 +46,10 @@ def form_measures(
 
 
 def _largest_tilt(vertices: Tensor, topology: Topology, normals: Tensor) -> float:
-    """Largest angle between prescribed normals (V, 3), zero where none, and those of the stars."""
+    """Largest angle between prescribed normals (V, 3), zero where none, and those of the surface there."""
     chosen = torch.nonzero((normals != 0.0).any(1)).squeeze(1)
     if not chosen.numel():
         return 0.0
-    areas = face_area_vectors(vertices, topology)[topology.corner_faces]
-    stars = scatter_sum(areas, topology.corners, topology.num_vertices)[chosen]
-    sine = torch.linalg.vector_norm(torch.linalg.cross(stars, normals[chosen]), dim=1)
-    return float(torch.atan2(sine, (stars * normals[chosen]).sum(1)).max())
+    found = BoundaryNormals.of(vertices, topology).at_boundary()[chosen]
+    sine = torch.linalg.vector_norm(torch.linalg.cross(found, normals[chosen]), dim=1)
+    return float(torch.atan2(sine, (found * normals[chosen]).sum(1)).max())

@@ -55,7 +55,7 @@ class FormSettings:
     boundary: str = "fixed"
     boundary_weight: float = 1e4
     corner_angle: float = math.radians(40.0)
-    tangent_weight: float = 1e4
+    tangent_weight: float = 1e3
     handle_weight: float = 1e4
     coarse_smoothing: float = 1.5
     smoothing: float = 0.05

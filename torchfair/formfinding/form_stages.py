@@ -15,6 +15,8 @@ from .form_problem import FormProblem
 Observe = Callable[[Tensor], dict[str, float]]
 Stage = tuple[Tensor, ProjectionResult]
 
+_TANGENT_ROUNDS = 3
+
 
 class FormStages:
     """Runs stage after stage; every method gives the vertices after each, and ends early when a stage was stopped.
@@ -79,7 +81,9 @@ class FormStages:
 
     def _in_space(self, vertices: Tensor, smoothings: Sequence[float]) -> Iterator[Stage]:
         problem = self.problem
-        for fraction in smoothings:
+        # What tangent planes ask of stars depends on the surface inside: it is seen anew in every stage.
+        rounds = _TANGENT_ROUNDS if problem.has_tangent_planes else 0
+        for fraction in [*smoothings, *[smoothings[-1]] * rounds]:
             run = guided_projection(
                 problem.blocks(vertices),
                 problem.terms(vertices, problem.smoothing(vertices, fraction)),
