@@ -187,8 +187,9 @@ def draw_errors(reports: dict[str, Report], results: Results) -> None:
             if known:
                 line = "-" if name == next(iter(reports)) else DASHES
                 x, y = zip(*known, strict=True)
-                charts[1].plot(x, y, color=tint, linestyle=line, marker="o", markersize=points(7),
-                               linewidth=points(2.5), label=f"{label}, {'left' if line == '-' else 'right'} mesh")  # fmt: skip
+                where = "left" if line == "-" else "right"
+                style = {"marker": "o", "markersize": points(7), "linewidth": points(2.5), "color": tint}
+                charts[1].plot(x, y, linestyle=line, label=f"{label}, {where} mesh", **style)
     for chart in charts:
         chart.set_ylim(bottom=0)
         add_legend(chart, loc="upper left" if chart is not charts[2] else "lower left")

@@ -204,6 +204,25 @@ def test_boundary_and_tangent_planes_give_patches_of_cylinder_and_cone_back(run:
     assert by_angles["prescribed"] > 1.3 * by_angles["free"]
 
 
+def test_mean_curvature_is_better_where_stars_are_saddles(run: Run) -> None:
+    report = run("fig03_mean_curvature", "--rows", "24", "--perturbations", "0", "0.1", "--drawn", "0.1")["lattices"]
+    saddles, others = report["stars are saddles"], report["stars are no saddles"]
+    for size in ("0", "0.1"):
+        assert saddles[size]["stars"]["good"] == saddles[size]["stars"]["all"]
+        assert saddles[size]["self_intersecting_pyramids"] == 0
+        assert others[size]["stars"]["neither"] > 0.9 * others[size]["stars"]["all"]
+        assert others[size]["face_normal_error_degrees"] < 1.5 * saddles[size]["face_normal_error_degrees"]
+    assert max(rows["0"]["error"]["all"] for rows in (saddles, others)) < 0.02  # both are right when regular
+    assert others["0.1"]["error"]["all"] > 1.3 * saddles["0.1"]["error"]["all"] > 0.05
+
+
+def test_self_intersecting_pyramids_become_fewer_on_a_rough_saddle(run: Run) -> None:
+    row = run("fig12_pyramids", "--builtin", "inner_torus")["meshes"]["inner_torus"]
+    assert row["after"]["self_intersecting_pyramids"] < 0.3 * row["before"]["self_intersecting_pyramids"]
+    assert row["after"]["pyramid_penalty"] < 0.05 * row["before"]["pyramid_penalty"]
+    assert row["after"]["normal_variation"] < 0.9 * row["before"]["normal_variation"]
+
+
 TRAINING = ("--rows", "8", "--columns", "8", "--points", "120", "--batch", "60", "--steps", "90", "--log-every", "30")
 
 

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from torchfair import MeshError, ShapeError, Topology
 from torchfair.constraints import pyramid_terms, saddle_terms
-from torchfair.projection import guided_projection
+from torchfair.projection import ElementTerm, guided_projection
 from torchfair.stars import (
     PyramidPenalty,
     SaddlePenalty,
@@ -162,3 +162,44 @@ def test_guided_projection_makes_good_saddles_of_bad_stars() -> None:
     after = classify_stars(result.blocks["vertices"], topology).good[chosen]
     assert int(before.sum()) < 25
     assert int(after.sum()) >= 28
+
+
+def test_bad_saddles_of_a_mesh_are_removed_near_its_surface_with_few_vertices_moved() -> None:
+    """Bad stars and their neighbours are free; closeness keeps them on the surface, a weak pull where they were."""
+    random = torch.Generator().manual_seed(1)
+    i, j = torch.meshgrid(torch.arange(13), torch.arange(13), indexing="ij")
+    places = torch.stack([i + 0.5 * j, 0.9 * j], dim=-1).reshape(-1, 2).to(DOUBLE)
+    places = places - places.mean(0) + 0.3 * (2 * torch.rand(169, 2, generator=random, dtype=DOUBLE) - 1)
+
+    def surface(p: Tensor) -> Tensor:
+        return torch.stack([p[:, 0], p[:, 1], (p[:, 0] ** 2 - p[:, 1] ** 2) / 40], dim=-1)
+
+    index = torch.arange(169).view(13, 13)
+    a, b, c, d = (k.reshape(-1) for k in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    topology = Topology.from_faces(torch.cat([torch.stack([a, b, d], 1), torch.stack([b, c, d], 1)]))
+    start = surface(places)
+    inner = ~topology.is_boundary_vertex
+    bad = inner & ~classify_stars(start, topology).good
+    free = bad.clone()
+    v, w = topology.edges.unbind(1)
+    free[v[bad[w]]] = True
+    free[w[bad[v]]] = True
+    free &= inner
+
+    def off_surface(x: Tensor) -> Tensor:
+        return x[0, 2] - (x[0, 0] ** 2 - x[0, 1] ** 2) / 40
+
+    each = [("vertices", torch.arange(169)[:, None])]
+    terms = [
+        *saddle_terms(start, topology, inner, weight=100.0, margin=0.003),
+        ElementTerm("closeness", off_surface, each, weight=10.0),
+        ElementTerm("stay", lambda x, y: x[0] - y, each, data=(start,), weight=0.01),
+    ]
+    fixed = {"vertices": ~free[:, None].expand(-1, 3)}
+    moved = guided_projection({"vertices": start}, terms, fixed=fixed).blocks["vertices"]
+    steps = (moved - start).norm(dim=1)
+    left = inner & ~classify_stars(moved, topology).good
+    assert int(bad.sum()) >= 5
+    assert int(left.sum()) == 0
+    assert int((steps > 0.01).sum()) < 0.4 * int(inner.sum())
+    assert float((moved[:, 2] - surface(moved[:, :2])[:, 2]).abs().max()) < 0.02
