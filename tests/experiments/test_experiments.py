@@ -223,6 +223,14 @@ def test_self_intersecting_pyramids_become_fewer_on_a_rough_saddle(run: Run) -> 
     assert row["after"]["normal_variation"] < 0.9 * row["before"]["normal_variation"]
 
 
+def test_saddle_term_removes_bad_saddles_near_the_surface(run: Run) -> None:
+    results = run("repair_saddles", "--rows", "10", "--rounds", "2")["results"]
+    start, repaired = results["start"], results["saddle term"]
+    assert repaired["good_saddle"] > start["good_saddle"]
+    assert repaired["good_saddle"] >= 0.97 * start["inner_vertices"]
+    assert repaired["largest_distance"] < 0.05
+
+
 TRAINING = ("--rows", "8", "--columns", "8", "--points", "120", "--batch", "60", "--steps", "90", "--log-every", "30")
 
 
