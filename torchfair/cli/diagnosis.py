@@ -60,20 +60,28 @@ class Diagnosis:
 
 def diagnose_mesh(vertices: Tensor, topology: Topology) -> Diagnosis:
     """Judges all stars of one mesh ``(V, 3)``."""
-    overlaps = None
-    if topology.num_interior_edges <= MOST_ARCS:
-        try:
-            overlaps = gauss_overlaps(vertices, topology)
-        except MeshError:  # too many arcs near each other
-            overlaps = None
-    return Diagnosis(
-        topology=topology,
-        classes=classify_stars(vertices, topology),
-        crossings=pyramid_self_intersections(vertices, topology),
-        perimeters=pyramid_perimeters(vertices, topology),
-        windings=pyramid_windings(vertices, topology),
-        overlaps=overlaps,
-    )
+    from ..projection.threads import threads_for
+
+    # Stars are judged in small chunks: waking a second thread for each operation costs more than it saves.
+    with threads_for(0, vertices.device):
+        return Diagnosis(
+            topology=topology,
+            classes=classify_stars(vertices, topology),
+            crossings=pyramid_self_intersections(vertices, topology),
+            perimeters=pyramid_perimeters(vertices, topology),
+            windings=pyramid_windings(vertices, topology),
+            overlaps=_overlaps(vertices, topology),
+        )
+
+
+def _overlaps(vertices: Tensor, topology: Topology) -> GaussOverlaps | None:
+    """Crossings in the whole Gauss image; None for very large meshes and where too many arcs are near each other."""
+    if topology.num_interior_edges > MOST_ARCS:
+        return None
+    try:
+        return gauss_overlaps(vertices, topology)
+    except MeshError:
+        return None
 
 
 def counts(diagnosis: Diagnosis) -> dict[str, Any]:
