@@ -29,7 +29,8 @@ def catmull_clark(topology: Topology, *, boundary: Boundary = "curve", corners: 
         corners: (V,) bool, vertices that stay, as for :func:`loop`.
 
     Returns:
-        The fine mesh with V + E + F vertices and as many quads as the coarse faces have corners. Isolated vertices stay.
+        The fine mesh with V + E + F vertices and as many quads as the coarse faces have corners.
+        Isolated vertices stay.
 
     Raises:
         ShapeError: if ``corners`` is not a bool tensor (V,).
