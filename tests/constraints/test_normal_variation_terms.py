@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 from helpers import DOUBLE, random_rotation, tetrahedron, wavy_grid
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
@@ -62,6 +62,11 @@ def test_closed_gradient_equals_autograd(name: str) -> None:
 @settings(max_examples=50, deadline=None)
 def test_closed_gradient_equals_autograd_in_generic_position(seed: int) -> None:
     x = torch.randn(4, 3, dtype=DOUBLE, generator=torch.Generator().manual_seed(seed))
+    edge, left, right = x[1] - x[0], x[2] - x[0], x[3] - x[0]
+    normals = [
+        n / torch.linalg.vector_norm(n) for n in (torch.linalg.cross(edge, left), torch.linalg.cross(right, edge))
+    ]
+    assume(1.0 + float(normals[0] @ normals[1]) > 1e-4)  # not folded: autograd of 1 + cos a loses digits there
     expected = torch.func.jacrev(triangle_pair_bend)(x).reshape(-1)
     scale = float(expected.abs().max())
     assert triangle_pair_bend_gradient(x).allclose(expected, rtol=1e-7, atol=1e-8 * scale)
