@@ -36,7 +36,7 @@ class FormResult:
         stages: Every run of guided projection, in order, in normalised units; the quantity
             ``total_absolute_curvature`` in the history is in the unit of the input. Merits fall within a stage.
         levels: Level of refinement of every stage.
-        before, after: See :func:`form_measures`; ``before`` is that of the input.
+        before, after: Energies and conditions, see ``form_measures``; ``before`` is that of the input.
         notes: What the job decided on its own, in words.
     """
 

@@ -37,7 +37,7 @@ class GaussOverlaps(NamedTuple):
 
     @property
     def between_stars(self) -> int:
-        """Crossings of arcs that belong to no common pyramid: parts of the surface with equal normals."""
+        """Crossings of arcs that belong to no common pyramid, where parts of the surface have equal normals."""
         return self.crossings - self.within_pyramids
 
 

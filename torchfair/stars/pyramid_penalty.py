@@ -41,7 +41,7 @@ def pyramid_penalty(vertices: Tensor, topology: Topology) -> Tensor:
 
     Zero if and only if no normal pyramid intersects itself, positive otherwise: built on the predicate that
     :func:`~torchfair.stars.pyramid_self_intersections` counts with (without its allowance for rounding of
-    the coordinates). For the depth see :func:`crossing_depths`.
+    the coordinates). For the depth see ``crossing_depths``.
 
     Args:
         vertices: positions (*batch, V, 3), any length unit.
