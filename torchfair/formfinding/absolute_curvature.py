@@ -70,7 +70,7 @@ def minimise_absolute_curvature(
     settings: FormSettings | None = None,
     callback: Callback | None = None,
 ) -> FormResult:
-    """Moves the vertices of a surface so that C, the integral of |k1| + |k2|, becomes small.
+    """Moves the vertices of a surface so that C, the integral of ``|k1| + |k2|``, becomes small.
 
     Boundary vertices keep their places or glide on the boundary curves. With ``levels`` the result is refined
     and improved again: Loop subdivision for triangle meshes, Catmull-Clark for others; new boundary vertices
