@@ -1,8 +1,8 @@
 """torchfair: visual smoothness of polyhedral surfaces, measured and created.
 
 The parts are imported by name: ``torchfair.geometry``, ``torchfair.energies``, ``torchfair.shapes``,
-``torchfair.subdivision``, ``torchfair.projection``, ``torchfair.constraints``, ``torchfair.formfinding``,
-``torchfair.viewing``.
+``torchfair.stars``, ``torchfair.subdivision``, ``torchfair.projection``, ``torchfair.constraints``,
+``torchfair.formfinding``, ``torchfair.viewing``.
 """
 
 from .energies import AngleVariation as AngleVariation

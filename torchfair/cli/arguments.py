@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .errors import CommandError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    Settings = TypeVar("Settings", bound=DataclassInstance)
 
 
 def count(text: str) -> int:
@@ -39,6 +46,22 @@ def non_negative(text: str) -> float:
     if not (math.isfinite(value) and value >= 0):
         raise argparse.ArgumentTypeError(f"expected a number of at least 0, got {text!r}")
     return value
+
+
+def turning_angle(text: str) -> float:
+    """Radians of an angle given in degrees, 0 to 180."""
+    value = non_negative(text)
+    if value > 180.0:
+        raise argparse.ArgumentTypeError(f"expected degrees from 0 to 180, got {text!r}")
+    return math.radians(value)
+
+
+def with_settings(defaults: Settings, **changes: Any) -> Settings:
+    """Settings of a job, a dataclass, with some fields changed; what it does not accept is a wrong use."""
+    try:
+        return replace(defaults, **changes)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
 
 
 def positive_or_none(text: str) -> float | None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .arguments import count
 from .errors import CommandError
 from .inputs import read_input
+from .outputs import refuse_existing
 from .plain import to_json
 
 if TYPE_CHECKING:
@@ -154,9 +155,7 @@ def _files(arguments: argparse.Namespace) -> list[Path]:
             raise CommandError("--vertex draws a picture and needs a folder for it: --output FOLDER")
         return []
     files = [Path(arguments.output) / name for name in (REPORT, *(() if arguments.no_pictures else PICTURES))]
-    existing = [str(path) for path in files if path.exists()]
-    if existing and not arguments.force:
-        raise CommandError(f"{', '.join(existing)} exists: choose another folder, or --force to replace")
+    refuse_existing(files, force=arguments.force)
     return files
 
 

@@ -7,8 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import non_negative, positive_count, positive_or_none, vertex_target
-from .errors import CommandError
+from .arguments import non_negative, positive_count, positive_or_none, turning_angle, vertex_target, with_settings
 from .fair_outputs import PICTURES, FairOutputs
 from .inputs import read_input
 
@@ -40,7 +39,7 @@ def add_parser(subparsers: Any) -> None:
         "reference than this many mean edges; 'none' for no limit (default 0.05)")  # fmt: skip
     add("--boundary", choices=("glide", "fixed", "free"), default="glide", help="boundary vertices slide along the "
         "boundary curve, stay, or are free (default glide)")  # fmt: skip
-    add("--corner-angle", type=non_negative, default=40.0, metavar="DEG", help="the boundary curve has a corner, "
+    add("--corner-angle", type=turning_angle, default="40", metavar="DEG", help="the boundary curve has a corner, "
         "which stays, where it turns by more than this (default 40)")  # fmt: skip
     add("--handle", nargs=4, action="append", default=[], metavar=("VERTEX", "X", "Y", "Z"),
         help="pull a vertex (counted from 0) to a place; repeatable")  # fmt: skip
@@ -100,30 +99,23 @@ def solve(
 
 def read_settings(arguments: argparse.Namespace) -> FairSettings:
     """Settings of the job from the command line."""
-    from dataclasses import replace
-
     from ..formfinding import FairSettings
 
-    if not arguments.corner_angle <= 180.0:
-        raise CommandError(f"--corner-angle runs from 0 to 180 degrees, got {arguments.corner_angle:g}")
     defaults = FairSettings()
-    projection = replace(defaults.projection, max_iterations=arguments.iterations, solver=arguments.solver)
-    try:
-        return replace(
-            defaults,
-            energy_weight=arguments.energy,
-            closeness_weight=arguments.closeness,
-            distance_limit=arguments.distance,
-            fairness_weight=arguments.fairness,
-            boundary=arguments.boundary,
-            corner_angle=math.radians(arguments.corner_angle),
-            planar=arguments.planar,
-            smallest_angle=math.radians(arguments.smallest_angle),
-            formulation=arguments.formulation,
-            projection=projection,
-        )
-    except ValueError as error:
-        raise CommandError(str(error)) from None
+    projection = with_settings(defaults.projection, max_iterations=arguments.iterations, solver=arguments.solver)
+    return with_settings(
+        defaults,
+        energy_weight=arguments.energy,
+        closeness_weight=arguments.closeness,
+        distance_limit=arguments.distance,
+        fairness_weight=arguments.fairness,
+        boundary=arguments.boundary,
+        corner_angle=arguments.corner_angle,
+        planar=arguments.planar,
+        smallest_angle=math.radians(arguments.smallest_angle),
+        formulation=arguments.formulation,
+        projection=projection,
+    )
 
 
 def summary(result: FairResult) -> str:

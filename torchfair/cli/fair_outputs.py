@@ -20,37 +20,16 @@ class FairOutputs(Outputs):
     def write(
         self, mesh: PolygonMesh, result: FairResult, settings: FairSettings, arguments: argparse.Namespace
     ) -> None:
-        """Writes everything, the mesh first: it is what must not be lost."""
-        from ..io import save_mesh
-        from .report import write_report
-
-        save_mesh(self.mesh, result.vertices, mesh.topology, overwrite=arguments.force)
-        write_report(
-            self.report,
-            energies_before=result.before,
-            energies_after=result.after,
-            residuals=result.projection.residuals,
-            history=result.projection.history,
-            settings=settings,
-            timings=result.projection.timings,
-            extra={
-                "input": str(arguments.input),
-                "output": str(self.mesh),
-                "reference": arguments.reference,
-                "handles": [[float(word) for word in words] for words in arguments.handle],
-                "status": result.projection.status.name.lower(),
-                "message": result.projection.message,
-                "converged": result.projection.status.converged,
-                "iterations": result.projection.iterations,
-                "solver": result.projection.solver,
-                "notes": result.notes,
-                "preparation": [[record.as_dict() for record in run.history] for run in result.preparation],
-                "initial_residuals": result.projection.initial_residuals,
-                "energy_change_percent": 100.0
-                * (result.after["normal_variation"] / max(result.before["normal_variation"], 1e-300) - 1.0),
-            },
-            overwrite=arguments.force,
-        )
+        """Writes everything."""
+        before, after = (energies["normal_variation"] for energies in (result.before, result.after))
+        extra = {
+            "reference": arguments.reference,
+            "iterations": result.projection.iterations,
+            "preparation": [[record.as_dict() for record in run.history] for run in result.preparation],
+            "initial_residuals": result.projection.initial_residuals,
+            "energy_change_percent": 100.0 * (after / max(before, 1e-300) - 1.0),
+        }
+        self.write_mesh_and_report(mesh.topology, result, settings, arguments, extra)
         if self.pictures:
             self._draw(mesh, result, arguments.force)
 

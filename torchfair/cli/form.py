@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import count, non_negative, positive_count, vertex_target
-from .errors import CommandError
+from .arguments import count, non_negative, positive_count, turning_angle, vertex_target, with_settings
 from .form_inputs import FormInput, read_form_input
 from .form_outputs import PICTURES, FormOutputs
 
@@ -43,8 +41,8 @@ def add_parser(subparsers: Any) -> None:
     add("--repair", action="store_true", help="orient faces consistently and drop unused vertices first")
     add("--boundary", choices=("fixed", "glide"), default="fixed", help="boundary vertices stay, or slide along the "
         "boundary curves (default fixed)")  # fmt: skip
-    add("--corner-angle", type=non_negative, default=40.0, metavar="DEG", help="a boundary curve has a corner where it "
-        "turns by more than this (default 40)")  # fmt: skip
+    add("--corner-angle", type=turning_angle, default="40", metavar="DEG", help="a boundary curve has a corner where "
+        "it turns by more than this (default 40)")  # fmt: skip
     add("--handle", nargs=4, action="append", default=[], metavar=("VERTEX", "X", "Y", "Z"),
         help="pull a vertex of INPUT (counted from 0) to a place; repeatable")  # fmt: skip
     add("--through", nargs=3, action="append", default=[], type=float, metavar=("X", "Y", "Z"),
@@ -99,28 +97,21 @@ def solve(start: FormInput, handles: dict[int, list[float]], settings: FormSetti
 
 def read_settings(arguments: argparse.Namespace) -> FormSettings:
     """Settings of the job from the command line."""
-    from dataclasses import replace
-
     from ..formfinding import FormSettings
 
-    if not arguments.corner_angle <= 180.0:
-        raise CommandError(f"--corner-angle runs from 0 to 180 degrees, got {arguments.corner_angle:g}")
     defaults = FormSettings()
-    projection = replace(defaults.projection, max_iterations=arguments.iterations, solver=arguments.solver)
-    try:
-        return replace(
-            defaults,
-            fairness_weight=arguments.fairness,
-            tangential_fairness_weight=arguments.tangential_fairness,
-            boundary=arguments.boundary,
-            corner_angle=math.radians(arguments.corner_angle),
-            smoothing=arguments.smoothing,
-            coarse_smoothing=max(defaults.coarse_smoothing, arguments.smoothing),
-            formulation=arguments.formulation,
-            projection=projection,
-        )
-    except ValueError as error:
-        raise CommandError(str(error)) from None
+    projection = with_settings(defaults.projection, max_iterations=arguments.iterations, solver=arguments.solver)
+    return with_settings(
+        defaults,
+        fairness_weight=arguments.fairness,
+        tangential_fairness_weight=arguments.tangential_fairness,
+        boundary=arguments.boundary,
+        corner_angle=arguments.corner_angle,
+        smoothing=arguments.smoothing,
+        coarse_smoothing=max(defaults.coarse_smoothing, arguments.smoothing),
+        formulation=arguments.formulation,
+        projection=projection,
+    )
 
 
 def summary(result: FormResult) -> str:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import argparse
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from .errors import CommandError
+
+if TYPE_CHECKING:
+    from ..formfinding import FairResult, FormResult
+    from ..topology import Topology
 
 _MESH_FORMATS = (".obj", ".off", ".ply")
 
@@ -33,11 +39,52 @@ class Outputs:
         """Refuses unknown mesh formats and, without ``force``, files that exist."""
         if self.mesh.suffix.lower() not in _MESH_FORMATS:
             raise CommandError(f"cannot write '{self.mesh}': choose a name that ends in {', '.join(_MESH_FORMATS)}")
-        existing = [str(path) for path in self.paths() if path.exists()]
-        if existing and not force:
-            raise CommandError(f"{', '.join(existing)} exists: choose another folder, or --force to replace")
+        refuse_existing(self.paths(), force=force)
 
     def make_folders(self) -> None:
         """Makes the folders of all files, so that a solve does not end with nowhere to write."""
         for folder in {self.mesh.parent, self.folder}:
             folder.mkdir(parents=True, exist_ok=True)
+
+    def write_mesh_and_report(
+        self,
+        topology: Topology,
+        result: FairResult | FormResult,
+        settings: object,
+        arguments: argparse.Namespace,
+        extra: Mapping[str, Any],
+    ) -> None:
+        """Writes the mesh, which is what must not be lost, then the report: what all jobs report, and ``extra``."""
+        from ..io import save_mesh
+        from .report import write_report
+
+        run = result.projection
+        save_mesh(self.mesh, result.vertices, topology, overwrite=arguments.force)
+        common = {
+            "input": arguments.input,
+            "output": str(self.mesh),
+            "handles": [[float(word) for word in words] for words in arguments.handle],
+            "status": run.status.name.lower(),
+            "message": run.message,
+            "converged": run.status.converged,
+            "solver": run.solver,
+            "notes": result.notes,
+        }
+        write_report(
+            self.report,
+            energies_before=result.before,
+            energies_after=result.after,
+            residuals=run.residuals,
+            history=run.history,
+            settings=settings,
+            timings=run.timings,
+            extra={**common, **extra},
+            overwrite=arguments.force,
+        )
+
+
+def refuse_existing(paths: Sequence[Path], *, force: bool) -> None:
+    """Refuses files that exist, unless they may be replaced."""
+    existing = [str(path) for path in paths if path.exists()]
+    if existing and not force:
+        raise CommandError(f"{', '.join(existing)} exists: choose another folder, or --force to replace")

@@ -11,6 +11,7 @@ from torch.linalg import cross, vector_norm
 from ..projection import ElementTerm
 from ..projection.nuclear_norm import SmoothNuclearNorm
 from ..topology import Topology
+from .star_stencils import closed_star_stencils, open_star_stencils
 
 NAME = "absolute curvature"
 _ROOT = math.sqrt(2.0)
@@ -37,25 +38,14 @@ def absolute_curvature_terms(
     topology.require_triangles()
     loss = SmoothNuclearNorm(smoothing)
     terms = []
-    for centres, rings in topology.rings_by_valence.values():
-        stencil = [(block, torch.cat([centres[:, None], rings], dim=1))]
-        terms.append(ElementTerm(NAME, closed_star, stencil, weight=weight, loss=loss, jacobian=closed_star_derivative))
-    for stencil_rows in _open_stars(topology):
-        stencil = [(block, stencil_rows)]
-        terms.append(ElementTerm(NAME, open_star, stencil, weight=weight, loss=loss, jacobian=open_star_derivative))
+    for stencil in closed_star_stencils(topology):
+        star = [(block, stencil)]
+        terms.append(ElementTerm(NAME, closed_star, star, weight=weight, loss=loss, jacobian=closed_star_derivative))
+    bent = torch.nonzero(topology.is_boundary_vertex & (topology.valences > 2)).squeeze(1)  # with an interior edge
+    for _, stencil in open_star_stencils(topology, bent):
+        star = [(block, stencil)]
+        terms.append(ElementTerm(NAME, open_star, star, weight=weight, loss=loss, jacobian=open_star_derivative))
     return terms
-
-
-def _open_stars(topology: Topology) -> list[Tensor]:
-    """Boundary vertices with at least one interior edge, and their rings, by valence."""
-    boundary = torch.nonzero(topology.is_boundary_vertex).squeeze(1)
-    valences = topology.valences[boundary]
-    rows = []
-    for valence in torch.unique(valences[valences > 2]).tolist():
-        centres = boundary[valences == valence]
-        places = topology.ring_offsets[centres, None] + torch.arange(valence, device=topology.device)
-        rows.append(torch.cat([centres[:, None], topology.ring_vertices[places]], dim=1))
-    return rows
 
 
 def closed_star(x: Tensor) -> Tensor:

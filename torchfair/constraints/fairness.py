@@ -10,6 +10,7 @@ from ..polylines import straight_triples
 from ..projection import ElementTerm
 from ..projection.layout import State
 from ..topology import Topology
+from .star_stencils import closed_star_stencils
 
 _ROUNDS = 3  # of averaging over neighbours
 
@@ -38,11 +39,10 @@ def interior_fairness_terms(topology: Topology, *, weight: float, block: str = "
     terms = []
     if triples.numel():
         terms.append(ElementTerm("fairness", second_difference, [(block, triples)], weight=weight, linear=True))
-    for centres, ring in topology.rings_by_valence.values():
-        chosen = ~in_grid[centres]
-        if bool(chosen.any()):
-            stencil = torch.cat([centres[:, None], ring], dim=1)[chosen]
-            terms.append(ElementTerm("fairness", umbrella, [(block, stencil)], weight=weight, linear=True))
+    for stencil in closed_star_stencils(topology):
+        chosen = stencil[~in_grid[stencil[:, 0]]]
+        if chosen.numel():
+            terms.append(ElementTerm("fairness", umbrella, [(block, chosen)], weight=weight, linear=True))
     return terms
 
 
@@ -63,13 +63,13 @@ def tangential_fairness_terms(topology: Topology, *, weight: float, block: str =
     The tangent plane is that of the vertex normal, refreshed at every state.
     """
     terms = []
-    for centres, ring in topology.rings_by_valence.values():
+    for stencil in closed_star_stencils(topology):
 
-        def refresh(state: State, centres: Tensor = centres) -> tuple[Tensor]:
+        def refresh(state: State, centres: Tensor = stencil[:, 0]) -> tuple[Tensor]:
             return (vertex_normals(state[block], topology)[centres],)
 
-        stencil = [(block, torch.cat([centres[:, None], ring], dim=1))]
-        terms.append(ElementTerm("tangential fairness", tangential_umbrella, stencil, weight=weight, refresh=refresh))
+        star = [(block, stencil)]
+        terms.append(ElementTerm("tangential fairness", tangential_umbrella, star, weight=weight, refresh=refresh))
     return terms
 
 
@@ -88,12 +88,12 @@ def even_fairness_terms(
         ElementTerm(
             "fairness",
             umbrella_offset,
-            [(block, torch.cat([centres[:, None], ring], dim=1))],
-            data=(even[centres],),
+            [(block, stencil)],
+            data=(even[stencil[:, 0]],),
             weight=weight,
             linear=True,
         )
-        for centres, ring in topology.rings_by_valence.values()
+        for stencil in closed_star_stencils(topology)
     ]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -14,7 +13,7 @@ from ..geometry import face_normals, shape_operators
 from ..geometry.star_normals import star_normals
 from ..geometry.tangent_basis import tangent_bases
 from ..geometry.tangential_shape_operator import restrict
-from ..projection import ElementTerm, SmoothAbsolute, symmetric_components
+from ..projection import ElementTerm, SmoothAbsolute, symmetric_components, symmetric_matrix
 from ..topology import Topology
 from .absolute_curvature import NAME
 
@@ -85,7 +84,7 @@ def operator_residual(x: Tensor, s: Tensor, w: Tensor, sign: Tensor) -> Tensor:
 
 def eigenvector_residual(w: Tensor, k: Tensor, d: Tensor) -> Tensor:
     """(5): ``W d - k d`` for both directions."""
-    return (d @ _matrix(w[0]) - k * d).reshape(-1)
+    return (d @ symmetric_matrix(w[0]) - k * d).reshape(-1)
 
 
 def tangency_residual(d: Tensor, n: Tensor) -> Tensor:
@@ -177,10 +176,3 @@ def _by_owner(owners: Tensor, count: int) -> Iterator[tuple[Tensor, Tensor]]:
     for size in torch.unique(sizes).tolist():
         chosen = torch.nonzero(sizes == size).squeeze(1)
         yield chosen, order[starts[chosen, None] + torch.arange(size, device=owners.device)]
-
-
-def _matrix(w: Tensor) -> Tensor:
-    """The matrix of six components (see ``symmetric_components``) of one star."""
-    half = math.sqrt(0.5)
-    xx, yy, zz, yz, xz, xy = (w * w.new_tensor([1.0, 1.0, 1.0, half, half, half])).unbind()
-    return torch.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz]).reshape(3, 3)

@@ -9,11 +9,11 @@ from torch import Tensor
 
 from ..projection import ElementTerm
 from ..projection.layout import State
-from ..stars._groups import star_groups
 from ..stars._saddle_targets import saddle_planes, saddle_sides, star_shape
 from ..stars.pyramid_penalty import crossing_depths
 from ..stars.saddle_penalty import saddle_defects, saddle_groups
 from ..topology import Topology
+from .star_stencils import closed_star_stencils
 
 
 def star_crossings(x: Tensor) -> Tensor:
@@ -31,10 +31,9 @@ def pyramid_terms(topology: Topology, *, weight: float, block: str = "vertices")
     The normals are those of the sectors between neighbouring edges: of the faces, where these are planar.
     """
     terms = []
-    for centres, ring, _ in star_groups(topology):
-        if ring.shape[1] > 3:
-            stencil = [(block, torch.cat([centres[:, None], ring], dim=1))]
-            terms.append(ElementTerm("pyramids", star_crossings, stencil, weight=weight))
+    for stencil in closed_star_stencils(topology):
+        if stencil.shape[1] > 4:  # three edges make a triangle, which does not cross itself
+            terms.append(ElementTerm("pyramids", star_crossings, [(block, stencil)], weight=weight))
     return terms
 
 

@@ -10,8 +10,10 @@ from torch.linalg import cross, vector_norm
 
 from ..geometry import face_area_vectors
 from ..geometry._ops import scatter_sum
+from ..geometry.normals import normalise
 from ..projection import ElementTerm
 from ..topology import Topology
+from .star_stencils import open_star_stencils
 
 _LARGEST_SHARE = 0.8
 
@@ -38,7 +40,7 @@ class BoundaryNormals(NamedTuple):
         """Those of one mesh (V, 3)."""
         count = topology.num_vertices
         areas = face_area_vectors(vertices, topology)
-        star = _unit(scatter_sum(areas[topology.corner_faces], topology.corners, count))
+        star = normalise(scatter_sum(areas[topology.corner_faces], topology.corners, count), 0.0)
         inside = (~topology.is_boundary_vertex)[:, None].to(vertices.dtype)
         v, w = topology.edges.unbind(1)
         ends, others = torch.cat([v, w]), torch.cat([w, v])
@@ -62,12 +64,12 @@ class BoundaryNormals(NamedTuple):
 
     def at_boundary(self) -> Tensor:
         """(V, 3) unit normals extrapolated to the vertices."""
-        return _unit(self.star - self.share[:, None] * self.inner)
+        return normalise(self.star - self.share[:, None] * self.inner, 0.0)
 
     def star_targets(self, normals: Tensor) -> Tensor:
         """(V, 3) unit star normals that belong to prescribed unit ``normals`` (V, 3) at the vertices."""
         share = self.share[:, None]
-        return _unit((1.0 - share) * normals + share * self.inner)
+        return normalise((1.0 - share) * normals + share * self.inner, 0.0)
 
 
 def tilt(x: Tensor, first: Tensor, second: Tensor) -> Tensor:
@@ -98,11 +100,7 @@ def tangent_plane_terms(
     """
     first, second = tangent_frames(normals)
     terms = []
-    valences = topology.valences[vertices]
-    for valence in torch.unique(valences[valences > 1]).tolist():
-        chosen = torch.nonzero(valences == valence).squeeze(1)
-        places = topology.ring_offsets[vertices[chosen], None] + torch.arange(valence)
-        stencil = torch.cat([vertices[chosen, None], topology.ring_vertices[places]], dim=1)
+    for chosen, stencil in open_star_stencils(topology, vertices):
         data = (first[chosen], second[chosen])
         terms.append(ElementTerm("tangent planes", tilt, [(block, stencil)], data=data, weight=weight))
     return terms
@@ -128,8 +126,3 @@ def _along(vectors: Tensor, axes: Tensor) -> Tensor:
     """Parts of vectors along axes of any length; zero where an axis is."""
     squared = (axes * axes).sum(1, keepdim=True)
     return (vectors * axes).sum(1, keepdim=True) / torch.where(squared > 0, squared, 1.0) * axes
-
-
-def _unit(vectors: Tensor) -> Tensor:
-    unit: Tensor = vectors / vector_norm(vectors, dim=1, keepdim=True).clamp_min(1e-300)
-    return unit

@@ -11,14 +11,14 @@ from torch import Tensor
 from ..curves import ClosedCurve
 from ..energies import total_absolute_curvature
 from ..errors import MeshError, ShapeError
-from ..geometry import degenerate_faces
 from ..projection import ProjectionResult
 from ..projection.iteration import Callback
 from ..projection.normalisation import Normalisation
 from ..subdivision import Refinement, catmull_clark, loop
 from ..topology import Topology
 from ..triangulation import triangulate
-from .boundary_track import BoundaryTrack
+from .boundary_track import BoundaryTrack, new_boundary_vertices
+from .checks import one_start, refuse_degenerate_faces
 from .form_problem import FormProblem
 from .form_report import form_measures
 from .form_settings import FormSettings
@@ -98,7 +98,9 @@ def minimise_absolute_curvature(
             no vertex.
     """
     settings = settings or FormSettings()
-    start, topology = _checked(vertices, topology), topology.to("cpu")
+    start, topology = one_start(vertices, topology), topology.to("cpu")
+    Normalisation.of(start, topology)  # refuses what is not finite or has no extent
+    refuse_degenerate_faces(start, topology)
     normals = _unit_normals(normals, topology)
     pulled, targets = read_handles(handles or {}, topology)
     notes: list[str] = []
@@ -170,27 +172,13 @@ def _refine(topology: Topology, track: BoundaryTrack) -> Refinement:
 
 def _refined_normals(normals: Tensor, refinement: Refinement) -> Tensor:
     """Prescribed normals of the finer boundary: a new vertex has the mean of both ends if both are prescribed."""
-    coarse = refinement.coarse
-    ends = normals[coarse.boundary_edges]
+    ends = normals[refinement.coarse.boundary_edges]
     mean = ends.sum(1)
     given = (ends != 0.0).any(2).all(1) & (mean != 0.0).any(1)
     mean = torch.where(given[:, None], mean / mean.norm(dim=1, keepdim=True), torch.zeros_like(mean))
     result = refinement.carry_vertex_labels(normals)
-    first = coarse.num_vertices + coarse.num_interior_edges
-    result[first : coarse.num_vertices + coarse.num_edges] = mean
+    result[new_boundary_vertices(refinement)] = mean
     return result
-
-
-def _checked(vertices: Tensor, topology: Topology) -> Tensor:
-    topology.check_vertices(vertices)
-    if vertices.ndim != 2:
-        raise ShapeError("vertices", f"({topology.num_vertices}, 3), one mesh", tuple(vertices.shape))
-    start = vertices.detach().to("cpu", torch.float64)
-    Normalisation.of(start, topology.to("cpu"))  # refuses what is not finite or has no extent
-    bad = torch.nonzero(degenerate_faces(start, topology.to("cpu"))).squeeze(1).tolist()
-    if bad:
-        raise MeshError(f"{len(bad)} face(s) have no area: faces {bad[:5]}. Move their vertices apart first.")
-    return start
 
 
 def _unit_normals(normals: Tensor | None, topology: Topology) -> Tensor:

@@ -94,8 +94,7 @@ class BoundaryTrack:
         start, end = self.parameters[coarse.boundary_edges].unbind(1)
         there = torch.remainder(end - start + 0.5, 1.0) - 0.5  # either way round, the short one
         parameters = refinement.carry_vertex_labels(self.parameters)
-        first = coarse.num_vertices + coarse.num_interior_edges
-        parameters[first : coarse.num_vertices + coarse.num_edges] = torch.remainder(start + 0.5 * there, 1.0)
+        parameters[new_boundary_vertices(refinement)] = torch.remainder(start + 0.5 * there, 1.0)
         return BoundaryTrack(refinement.topology, self.curves, parameters, refinement.carry_vertex_labels(self.corners))
 
     def polylines(self) -> tuple[list[Tensor], list[bool]]:
@@ -123,6 +122,12 @@ class BoundaryTrack:
             result[mine] = first + (torch.remainder(place, len(stops)) if len(stops) else torch.zeros_like(place))
             first += max(1, len(stops))
         return result
+
+
+def new_boundary_vertices(refinement: Refinement) -> slice:
+    """Numbers of the vertices of one refinement step that stem from boundary edges, in the order of these."""
+    coarse = refinement.coarse
+    return slice(coarse.num_vertices + coarse.num_interior_edges, coarse.num_vertices + coarse.num_edges)
 
 
 def _gap(parameters: Tensor, other: Tensor) -> Tensor:

@@ -14,13 +14,14 @@ from ..constraints.closeness import TangentPlanes
 from ..constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
 from ..energies import normal_variation
 from ..errors import MeshError
-from ..geometry import corner_angles, degenerate_faces, face_areas, face_normals
+from ..geometry import corner_angles, face_areas, face_normals
 from ..geometry.closest_curve_point import ReferenceCurves
 from ..geometry.closest_point import ReferenceSurface
 from ..geometry.planarity import planarity
 from ..projection import ElementTerm
 from ..projection.layout import State
 from ..topology import Topology
+from .checks import refuse_degenerate_faces
 from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)
@@ -51,7 +52,7 @@ class FairProblem:
     ) -> None:
         self.vertices, self.topology, self.settings = vertices, topology, settings
         self.notes: list[str] = []
-        self._refuse_degenerate_faces()
+        refuse_degenerate_faces(vertices, topology)
         self.reference = ReferenceSurface(*(reference or (vertices, topology)))
         self._planes = TangentPlanes(self.reference)
         self._other_goals = bool(targets) or reference is not None
@@ -110,13 +111,6 @@ class FairProblem:
         return {"vertices": vertices, **lifted_blocks(vertices, self.topology)}
 
     # ---- decisions -------------------------------------------------------------------------------------
-
-    def _refuse_degenerate_faces(self) -> None:
-        bad = torch.nonzero(degenerate_faces(self.vertices, self.topology)).squeeze(1).tolist()
-        if bad:
-            raise MeshError(
-                f"{len(bad)} face(s) have no area: faces {bad[:5]}. Remove them or move their vertices apart first."
-            )
 
     def _leaves_reference(self) -> bool:
         limit = self.settings.distance_limit

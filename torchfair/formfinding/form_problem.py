@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import TYPE_CHECKING
+
 import torch
 from torch import Tensor
 
 from .. import constraints as c
+from .._graph import graph_laplacian
 from ..constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks, lifted_absolute_curvature_terms
 from ..energies import total_absolute_curvature
-from ..geometry import corner_angles, face_normals, vertex_normals
+from ..geometry import corner_angles, vertex_normals
 from ..geometry.closest_curve_point import ReferenceCurves
 from ..projection import ElementTerm
-from ..projection.layout import State
 from ..projection.normalisation import Normalisation
 from ..topology import Topology
 from .boundary_track import BoundaryTrack
 from .form_settings import FormSettings
+
+if TYPE_CHECKING:
+    from scipy.sparse.linalg import SuperLU
 
 _EVENED = 0.2  # of the extent of the mesh
 _LEAST_LENGTH = 1e-2  # of a mean of unit normals that still has a direction
@@ -73,7 +79,7 @@ class FormProblem:
 
         Raw normals of a mesh that is not smooth yet cross each other and would drive vertices together.
         """
-        ways = self._smoothed(vertex_normals(vertices, self.topology))
+        ways = self._evened(vertex_normals(vertices, self.topology))
         pull = self.targets - vertices[self.handles]
         length = torch.linalg.vector_norm(pull, dim=1, keepdim=True)
         ways[self.handles] = torch.where(length > 0.0, pull / length, ways[self.handles])
@@ -86,21 +92,20 @@ class FormProblem:
         terms = [*self._curvature(smoothing), *self._others(vertices, fairness_weight)]
         return [c.along_directions(term, vertices, directions) for term in terms]
 
-    def _smoothed(self, normals: Tensor) -> Tensor:
+    def _evened(self, normals: Tensor) -> Tensor:
         """Unit vectors ``d`` with ``(I + (f sqrt(V))^2 / 6 L) d ~ n``, L the graph Laplacian."""
-        from scipy.sparse import coo_array, diags_array, eye_array
+        found = torch.from_numpy(self._evening.solve(normals.numpy()))
+        length = torch.linalg.vector_norm(found, dim=1, keepdim=True)
+        return torch.where(length > _LEAST_LENGTH, found / length.clamp_min(_LEAST_LENGTH), normals)
+
+    @cached_property
+    def _evening(self) -> SuperLU:
+        from scipy.sparse import eye_array
         from scipy.sparse.linalg import splu
 
         size = self.topology.num_vertices
-        v, w = self.topology.edges.numpy().T
-        graph = coo_array((torch.ones(len(v)).double().numpy(), (v, w)), shape=(size, size)).tocsr()
-        graph = graph + graph.T
-        laplacian = diags_array(graph.sum(axis=1)) - graph
         reach = (_EVENED * size**0.5) ** 2 / 6.0
-        smooth = splu((eye_array(size) + reach * laplacian).tocsc()).solve(normals.numpy())
-        found = torch.from_numpy(smooth)
-        length = torch.linalg.vector_norm(found, dim=1, keepdim=True)
-        return torch.where(length > _LEAST_LENGTH, found / length.clamp_min(_LEAST_LENGTH), normals)
+        return splu((eye_array(size) + reach * graph_laplacian(self.topology)).tocsc())
 
     # ---- vertices move in space ------------------------------------------------------------------------
 
@@ -140,12 +145,6 @@ class FormProblem:
         """Whether a corner angle is smaller than the settings allow and than half the smallest of the start."""
         smallest, before = (float(corner_angles(x, self.topology).min()) for x in (vertices, start))
         return smallest < min(self.settings.least_angle, 0.5 * before)
-
-    def keeps_faces(self, state: State, trial: State) -> bool:
-        """Whether no face turns over in a step."""
-        before = face_normals(state["vertices"], self.topology)
-        after = face_normals(trial["vertices"], self.topology)
-        return bool(((before * after).sum(1) > 0.0).all())
 
     # ---- terms -----------------------------------------------------------------------------------------
 

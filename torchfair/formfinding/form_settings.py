@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from ..projection import ProjectionSettings
+from .checks import check_choice, check_weights
 
 BOUNDARIES = ("fixed", "glide")
 FORMULATIONS = ("reduced", "lifted")
@@ -65,17 +66,14 @@ class FormSettings:
     projection: ProjectionSettings = field(default_factory=_default_projection)
 
     def __post_init__(self) -> None:
-        for name, allowed in (("boundary", BOUNDARIES), ("formulation", FORMULATIONS)):
-            if getattr(self, name) not in allowed:
-                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+        check_choice(self, "boundary", BOUNDARIES)
+        check_choice(self, "formulation", FORMULATIONS)
+        check_weights(self)
         if not 0.0 < self.smoothing <= self.coarse_smoothing < math.inf:
             raise ValueError(
                 f"smoothing must be positive and at most coarse_smoothing, got {self.smoothing} and "
                 f"{self.coarse_smoothing}"
             )
-        weights = [name for name in vars(self) if name.endswith("_weight") and not getattr(self, name) >= 0.0]
-        if weights:
-            raise ValueError(f"weights must be at least 0: {', '.join(weights)}")
 
     def smoothings(self) -> list[float]:
         """From coarse to fine, in geometric steps of about five."""

@@ -10,6 +10,7 @@ from torch import Tensor
 from ..projection import ProjectionResult, Status, guided_projection
 from ..projection.iteration import Callback
 from ..projection.layout import State
+from .face_guard import FaceGuard
 from .form_problem import FormProblem
 
 Observe = Callable[[Tensor], dict[str, float]]
@@ -91,7 +92,7 @@ class FormStages:
                 settings=problem.settings.projection,
                 callback=self.callback,
                 observe=lambda state: self.observe(state["vertices"]),
-                guard=problem.keeps_faces,
+                guard=FaceGuard(problem.topology, lambda state: state["vertices"]),
             )
             vertices = run.blocks["vertices"]
             yield vertices, run
@@ -119,7 +120,7 @@ class FormStages:
             settings=problem.settings.projection,
             callback=self.callback,
             observe=lambda state: self.observe(place(state)),
-            guard=lambda state, trial: problem.keeps_faces({"vertices": place(state)}, {"vertices": place(trial)}),
+            guard=FaceGuard(problem.topology, place),
         )
         return place(run.blocks), run
 

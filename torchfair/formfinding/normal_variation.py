@@ -9,12 +9,12 @@ import torch
 from torch import Tensor
 
 from ..energies import normal_variation
-from ..errors import ShapeError
 from ..projection import ProjectionResult, Status, guided_projection
 from ..projection.iteration import Callback
 from ..projection.layout import State
 from ..projection.normalisation import Normalisation
 from ..topology import Topology
+from .checks import one_start
 from .fair_problem import FairProblem
 from .fair_report import fair_measures
 from .handles import read_handles
@@ -82,11 +82,7 @@ def minimise_normal_variation(
         MeshError: vertices are not finite, a face has no area, or a handle is no vertex.
     """
     settings = settings or FairSettings()
-    topology.check_vertices(vertices)
-    if vertices.ndim != 2:
-        raise ShapeError("vertices", f"({topology.num_vertices}, 3), one mesh", tuple(vertices.shape))
-    start = vertices.detach().to("cpu", torch.float64)
-    topology = topology.to("cpu")
+    start, topology = one_start(vertices, topology), topology.to("cpu")
     normalisation = Normalisation.of(start, topology)
     pulled, targets = read_handles(handles or {}, topology)
     problem = FairProblem(

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from ..projection import ProjectionSettings
+from .checks import check_choice, check_weights
 
 BOUNDARIES = ("glide", "fixed", "free")
 PLANAR = ("keep", "quads", "none")
@@ -66,16 +67,13 @@ class FairSettings:
     projection: ProjectionSettings = field(default_factory=_default_projection)
 
     def __post_init__(self) -> None:
-        for name, allowed in (("boundary", BOUNDARIES), ("formulation", FORMULATIONS)):
-            if getattr(self, name) not in allowed:
-                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+        check_choice(self, "boundary", BOUNDARIES)
+        check_choice(self, "formulation", FORMULATIONS)
+        check_weights(self)
         if isinstance(self.planar, str) and self.planar not in PLANAR:
             raise ValueError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
         if self.distance_limit is not None and not self.distance_limit > 0.0:
             raise ValueError(f"distance_limit must be positive or None, got {self.distance_limit}")
-        weights = [name for name in vars(self) if name.endswith("_weight") and not getattr(self, name) >= 0.0]
-        if weights:
-            raise ValueError(f"weights must be at least 0: {', '.join(weights)}")
 
     def stage(self) -> ProjectionSettings:
         """Settings of a stage before the last: fewer steps, wider tolerance."""

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from .._graph import graph_laplacian
 from ..curves import ClosedCurve
 from ..errors import MeshError
 from ..topology import Topology
@@ -122,17 +123,12 @@ def _rows(rows: int, columns: int) -> np.ndarray:
 
 def _harmonic(vertices: Tensor, topology: Topology) -> Tensor:
     """Puts every inner vertex in the mean of its neighbours; boundary vertices stay."""
-    import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
-    v, w = topology.edges.numpy().T
-    size = topology.num_vertices
-    graph = sp.coo_matrix((np.ones(v.size), (v, w)), (size, size)).tocsr()
-    laplacian = sp.diags(topology.valences.numpy().astype(float)) - graph - graph.T
     free = np.flatnonzero(~topology.is_boundary_vertex.numpy())
     held = np.flatnonzero(topology.is_boundary_vertex.numpy())
-    rows = sp.csr_matrix(laplacian)[free]
-    inner = splu(sp.csc_matrix(rows[:, free])).solve(-(rows[:, held] @ vertices[held].numpy()))
+    rows = graph_laplacian(topology)[free]
+    inner = splu(rows[:, free].tocsc()).solve(-(rows[:, held] @ vertices[held].numpy()))
     result = vertices.clone()
     result[free] = torch.from_numpy(inner)
     return result

@@ -44,13 +44,10 @@ def symmetric_components(matrix: Tensor) -> Tensor:
 
 
 def symmetric_matrix(components: Tensor) -> Tensor:
-    """Matrices (..., 3, 3) with the given :func:`symmetric_components`."""
-    i, j = _pairs(components.device)
-    matrix = components.new_zeros(*components.shape[:-1], 3, 3)
-    scaled = components / _factors(components)
-    matrix[..., i, j] = scaled
-    matrix[..., j, i] = scaled
-    return matrix
+    """Matrices (..., 3, 3) with the given :func:`symmetric_components`; differentiable."""
+    xx, yy, zz, yz, xz, xy = (components / _factors(components)).unbind(-1)
+    matrix = torch.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], dim=-1)
+    return matrix.reshape(*components.shape[:-1], 3, 3)
 
 
 def _pairs(device: torch.device) -> tuple[Tensor, Tensor]:

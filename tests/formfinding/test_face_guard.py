@@ -1,0 +1,45 @@
+"""The guard against faces that turn over."""
+
+from __future__ import annotations
+
+import itertools
+
+import torch
+from torch import Tensor
+
+from torchfair import Topology
+from torchfair.formfinding.face_guard import FaceGuard
+from torchfair.projection.layout import State
+
+TOPOLOGY = Topology.from_faces([[0, 1, 2], [0, 2, 3]])
+SQUARE = torch.tensor([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=torch.float64)
+
+
+def moved(vertex: int, place: list[float]) -> dict[str, Tensor]:
+    vertices = SQUARE.clone()
+    vertices[vertex] = torch.tensor(place, dtype=torch.float64)
+    return {"x": vertices}
+
+
+def test_only_steps_that_turn_a_face_are_refused() -> None:
+    guard = FaceGuard(TOPOLOGY, lambda state: state["x"])
+    start = {"x": SQUARE}
+    assert guard(start, moved(1, [1.0, 0.2, 0.3]))
+    assert not guard(start, moved(1, [0.0, 1.0, 0.0]))  # beyond the diagonal
+    assert not guard(start, moved(1, [0.5, 0.5, 1.0]))  # upright
+    turned = moved(1, [0.0, 1.0, 0.0])
+    assert guard(turned, moved(1, [0.1, 0.9, 0.0]))  # judged from the state, not from the start
+
+
+def test_normals_of_a_trial_are_not_computed_again_when_it_becomes_the_state() -> None:
+    asked = []
+
+    def place(state: State) -> Tensor:
+        asked.append(state)
+        return state["x"]
+
+    guard = FaceGuard(TOPOLOGY, place)
+    states = [moved(1, [1.0, 0.1 * i, 0.0]) for i in range(4)]
+    for state, trial in itertools.pairwise(states):
+        assert guard(state, trial)
+    assert len(asked) == 4

@@ -1,0 +1,47 @@
+"""What the formfinding jobs ask of their start and of their settings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from ..errors import MeshError, ShapeError
+from ..geometry import degenerate_faces
+from ..topology import Topology
+
+
+def one_start(vertices: Tensor, topology: Topology) -> Tensor:
+    """The start (V, 3) as float64 on the CPU.
+
+    Raises:
+        ShapeError: vertices are not ``(V, 3)``.
+    """
+    topology.check_vertices(vertices)
+    if vertices.ndim != 2:
+        raise ShapeError("vertices", f"({topology.num_vertices}, 3), one mesh", tuple(vertices.shape))
+    return vertices.detach().to("cpu", torch.float64)
+
+
+def refuse_degenerate_faces(vertices: Tensor, topology: Topology) -> None:
+    """Raises MeshError naming the first faces of a mesh (V, 3) that have no area."""
+    bad = torch.nonzero(degenerate_faces(vertices, topology)).squeeze(1).tolist()
+    if bad:
+        raise MeshError(
+            f"{len(bad)} face(s) have no area: faces {bad[:5]}. Remove them or move their vertices apart first."
+        )
+
+
+def check_choice(settings: object, name: str, allowed: Sequence[str]) -> None:
+    """Raises ValueError unless the attribute ``name`` of the settings is one of the words ``allowed``."""
+    value = getattr(settings, name)
+    if value not in allowed:
+        raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")
+
+
+def check_weights(settings: object) -> None:
+    """Raises ValueError if a weight among the settings is negative or NaN."""
+    weights = [name for name in vars(settings) if name.endswith("_weight") and not getattr(settings, name) >= 0.0]
+    if weights:
+        raise ValueError(f"weights must be at least 0: {', '.join(weights)}")

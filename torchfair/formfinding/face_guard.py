@@ -1,0 +1,39 @@
+"""The guard of damped steps that keeps faces from turning over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from torch import Tensor
+
+from ..geometry import face_normals
+from ..projection.layout import State
+from ..topology import Topology
+
+
+class FaceGuard:
+    """Refuses steps in which a face turns over: a guard for :func:`~torchfair.projection.guided_projection`.
+
+    The normals of the last trials are kept, since the state of a step is most often the trial of the one before.
+
+    Args:
+        topology: Of the mesh.
+        place: The vertices (V, 3) of a state.
+    """
+
+    def __init__(self, topology: Topology, place: Callable[[State], Tensor]) -> None:
+        self._topology, self._place = topology, place
+        self._known: list[tuple[State, Tensor]] = []
+
+    def __call__(self, state: State, trial: State) -> bool:
+        """Whether every face of the trial is seen from the side it is seen from in the state."""
+        before, after = self._normals(state), self._normals(trial)
+        return bool(((before * after).sum(1) > 0.0).all())
+
+    def _normals(self, state: State) -> Tensor:
+        for known, normals in self._known:
+            if known is state:
+                return normals
+        normals = face_normals(self._place(state), self._topology)
+        self._known = [(state, normals), *self._known[:2]]
+        return normals
