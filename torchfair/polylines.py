@@ -89,26 +89,34 @@ def mesh_polylines(topology: Topology, *, corners: Tensor | None = None) -> list
     Returns:
         Vertex numbers, one int64 tensor of two or more for each polyline, on the device of ``topology``.
     """
-    darts = torch.cat([topology.edges, topology.edges.flip(1)])
-    followers = _following_darts(topology, darts, straight_triples(topology, corners=corners))
+    return join_triples(topology.edges, straight_triples(topology, corners=corners), topology.num_vertices)
+
+
+def join_triples(edges: Tensor, triples: Tensor, num_vertices: int) -> list[Tensor]:
+    """Polylines made of ``edges`` (n, 2), which continue each other at the middle vertices of ``triples`` (N, 3).
+
+    Both edges of a triple are among the edges, and no edge occurs in two triples with the same middle vertex. The
+    result is as for :func:`mesh_polylines`; open polylines that can be walked along the stored direction are.
+    """
+    darts = torch.cat([edges, edges.flip(1)])
+    followers = _following_darts(darts, triples, num_vertices)
     # a dart starts an open polyline if nothing continues into it, that is, if its reverse has no follower;
     # darts along the stored edges come first, so that boundary curves get the surface on their left
-    starts = torch.nonzero(followers.roll(topology.num_edges) < 0).squeeze(1)
+    starts = torch.nonzero(followers.roll(len(edges)) < 0).squeeze(1)
     sequence, lengths = _walk(followers.tolist(), starts.tolist())
-    chains = torch.split(darts[torch.tensor(sequence, dtype=torch.int64, device=topology.device)], lengths)
+    chains = torch.split(darts[torch.tensor(sequence, dtype=torch.int64, device=edges.device)], lengths)
     return [torch.cat([chain[:1, 0], chain[:, 1]]) for chain in chains]
 
 
-def _following_darts(topology: Topology, darts: Tensor, triples: Tensor) -> Tensor:
-    """(2E,) the directed edge that continues each directed edge, or -1.
+def _following_darts(darts: Tensor, triples: Tensor, num_vertices: int) -> Tensor:
+    """(2n,) the directed edge that continues each directed edge, or -1.
 
-    Dart ``e`` runs along edge ``e`` as it is stored, dart ``E + e`` against it.
+    Dart ``e`` runs along edge ``e`` as it is stored, dart ``n + e`` against it.
     """
-    count = topology.num_vertices
-    keys, order = torch.sort(darts[:, 0] * count + darts[:, 1])
+    keys, order = torch.sort(darts[:, 0] * num_vertices + darts[:, 1])
 
     def find(tails: Tensor, heads: Tensor) -> Tensor:
-        return order[torch.searchsorted(keys, tails * count + heads)]
+        return order[torch.searchsorted(keys, tails * num_vertices + heads)]
 
     previous, middle, following = triples.unbind(1)
     followers = torch.full_like(order, -1)

@@ -1,0 +1,12 @@
+"""Principal edges of triangle meshes: which they are, the stars and polylines they make, and strips along them.
+
+In a principal-symmetric mesh (paper section 2.3) one third of the edges follows principal curvature lines and the
+others lie symmetrically to them. :class:`PrincipalEdges` says which third that is.
+"""
+
+from .directions import AlignedEdges as AlignedEdges
+from .directions import principal_edges_from_directions as principal_edges_from_directions
+from .labels import principal_edges_from_seed as principal_edges_from_seed
+from .labels import principal_edges_of_lattice as principal_edges_of_lattice
+from .principal_edges import PrincipalEdges as PrincipalEdges
+from .principal_edges import PrincipalStars as PrincipalStars
