@@ -14,17 +14,9 @@ from ..geometry._ops import cross, norm
 from ..geometry.lengths import edge_vectors
 from ..geometry.normals import adjacent_normals, normalise
 from ..topology import Topology
+from .view_directions import axis_directions
 
 Form = Literal["sine", "dual"]
-
-
-def axis_directions(rotation: Tensor | None = None) -> Tensor:
-    """The six directions ``+-x, +-y, +-z`` as rows ``(6, 3)``, float64, turned by ``rotation`` (3, 3) if given.
-
-    The mean of a quadratic form over them is its mean over the whole sphere: they are a spherical 2-design.
-    """
-    axes = torch.eye(3, dtype=torch.float64) if rotation is None else rotation.T
-    return torch.cat([axes, -axes])
 
 
 def reflection_variation_per_edge(
