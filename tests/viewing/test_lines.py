@@ -4,9 +4,9 @@ import pytest
 import torch
 from helpers import DOUBLE, cube
 
+from torchfair.rasterisation.rasterise import visible_triangles
 from torchfair.viewing.camera import fit_camera
 from torchfair.viewing.lines import Surface, visible_lines
-from torchfair.viewing.rasterise import visible_triangles
 from torchfair.viewing.render import MeshView
 
 WALL = torch.tensor([[0.0, 0, 1], [0, 20, 1], [20, 20, 1], [20, 0, 1]], dtype=DOUBLE)

@@ -3,6 +3,8 @@
 Importing this package imports neither matplotlib nor PIL; they are loaded when a picture is written.
 """
 
+from ..rasterisation.rasterise import Fragments as Fragments
+from ..rasterisation.rasterise import rasterise as rasterise
 from .camera import Camera as Camera
 from .camera import fit_camera as fit_camera
 from .camera import look_axes as look_axes
@@ -15,8 +17,6 @@ from .picture_gauss_images import picture_gauss_images as picture_gauss_images
 from .picture_mesh import picture_mesh as picture_mesh
 from .picture_pyramids import picture_pyramids as picture_pyramids
 from .picture_star_classes import picture_star_classes as picture_star_classes
-from .rasterise import Fragments as Fragments
-from .rasterise import rasterise as rasterise
 from .render import MeshView as MeshView
 from .view_direction import ViewDirection as ViewDirection
 from .view_direction import view_direction as view_direction

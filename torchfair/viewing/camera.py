@@ -35,7 +35,7 @@ class Camera:
         """Pixel coordinates ``(*batch, V, 3)``: x to the right, y down from the top, and depth.
 
         Depth grows away from the eye and is affine over the screen as
-        :func:`~torchfair.viewing.rasterise.rasterise` asks: distance along the line of sight for a parallel
+        :func:`torchfair.viewing.rasterise` asks: distance along the line of sight for a parallel
         camera, ``-1 / distance`` for perspective. Points at or behind the eye of a perspective camera become NaN,
         so that triangles with such a corner are left out.
         """

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from .scan import Spans, span_chunks, triangle_spans
+from ..rasterisation.scan import Spans, span_chunks, triangle_spans
 
 _LONGEST = 4096  # samples along one edge
 
@@ -103,13 +103,13 @@ def _seen_samples(surface: Surface, ends: Tensor, steps: Tensor) -> tuple[Tensor
     seen = behind < 0
     over = torch.nonzero(~seen).squeeze(1)
     if over.shape[0]:
-        depth, slope = _planes(surface, behind[over], places[over, :2])
+        depth, slope = surface_planes(surface, behind[over], places[over, :2])
         tolerance = 1.5 * slope + 1e-3 * (ends[..., 2].amax() - ends[..., 2].amin())
         seen[over] = places[over, 2] <= depth + tolerance
     return seen, first
 
 
-def _planes(surface: Surface, triangle: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
+def surface_planes(surface: Surface, triangle: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
     """Depth of the planes of triangles at places ``(n, 2)`` on the screen, and how fast it changes per pixel."""
     corners = surface.points.detach()[surface.triangles[triangle]].to(torch.float64)
     origin, a, b = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]

@@ -10,11 +10,11 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError
+from ..rasterisation.rasterise import interpolate, visible_triangles
 from ..topology import Topology
 from ..triangulation import Triangulation, triangulate
 from .camera import Camera
 from .lines import EdgeStyle, Surface, visible_lines
-from .rasterise import interpolate, visible_triangles
 
 Color = tuple[float, float, float]
 

@@ -8,8 +8,8 @@ from scipy.spatial import Delaunay
 from torch import Tensor
 
 from torchfair import ShapeError
-from torchfair.viewing.rasterise import interpolate, rasterise, visible_triangles
-from torchfair.viewing.scan import triangle_spans
+from torchfair.rasterisation.rasterise import interpolate, rasterise, visible_triangles
+from torchfair.rasterisation.scan import triangle_spans
 
 TWO = torch.tensor([[0, 1, 2], [0, 2, 3]])
 
