@@ -8,6 +8,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from ..rasterisation.planes import plane_depths
 from ..rasterisation.scan import Spans, span_chunks, triangle_spans
 
 _LONGEST = 4096  # samples along one edge
@@ -103,22 +104,10 @@ def _seen_samples(surface: Surface, ends: Tensor, steps: Tensor) -> tuple[Tensor
     seen = behind < 0
     over = torch.nonzero(~seen).squeeze(1)
     if over.shape[0]:
-        depth, slope = surface_planes(surface, behind[over], places[over, :2])
+        depth, slope = plane_depths(surface.points, surface.triangles, behind[over], places[over, :2])
         tolerance = 1.5 * slope + 1e-3 * (ends[..., 2].amax() - ends[..., 2].amin())
         seen[over] = places[over, 2] <= depth + tolerance
     return seen, first
-
-
-def surface_planes(surface: Surface, triangle: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
-    """Depth of the planes of triangles at places ``(n, 2)`` on the screen, and how fast it changes per pixel."""
-    corners = surface.points.detach()[surface.triangles[triangle]].to(torch.float64)
-    origin, a, b = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = torch.linalg.cross(a, b)
-    across = normal[:, :2] / torch.where(normal[:, 2:] == 0, 1, -normal[:, 2:])
-    depth = origin[:, 2] + ((places - origin[:, :2]) * across).sum(-1)
-    nearest, farthest = corners[..., 2].amin(1), corners[..., 2].amax(1)
-    slope = torch.minimum(torch.linalg.vector_norm(across, dim=-1), farthest - nearest)
-    return torch.clamp(depth, nearest, farthest), slope
 
 
 def _ribbons(ends: Tensor, along: Tensor, lengths: Tensor, widths: Tensor) -> tuple[Tensor, Tensor]:

@@ -1,0 +1,85 @@
+"""Which share of every edge a viewer sees."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from ..errors import ShapeError, TorchfairError
+from ..geometry import face_normals
+from ..geometry._ops import dot
+from ..rasterisation.planes import plane_depths
+from ..rasterisation.rasterise import visible_triangles
+from ..topology import Topology
+from ..triangulation import triangulate
+from .camera import Camera, Size, height_and_width
+
+_SLACK = (1.5, 1e-3)
+"""What is not counted as in front: pixels along the slope of the nearest triangle, and a part of the depth range."""
+
+
+def edge_visibility(
+    vertices: Tensor, topology: Topology, camera: Camera, *, size: Size = 1024, samples: int = 8
+) -> Tensor:
+    """Visible share of every interior edge in each view: (views, I).
+
+    An edge counts where nothing hides it and the viewer sees the same side of both its faces: only there does one
+    mirror picture pass into another. Where a face turns away, the edge is part of an outline and has share 0. Both
+    sides of a face mirror. What lies outside of the picture is not seen.
+
+    Shares come from ``samples`` points per edge that are compared with the nearest triangle at their pixel. They are
+    right to one sample per edge, except for edges within two pixels of an outline.
+
+    Args:
+        vertices: positions (V, 3) of one mesh, finite.
+        topology: connectivity; any polygons, mixed.
+        camera: the views, such as ``OrthographicCamera.fit(vertices, directions=...)``.
+        size: pixels of the pictures.
+        samples: points per edge, at least 1.
+
+    Returns:
+        (views, I) in [0, 1], multiples of ``1/samples``, in the dtype of the vertices. Constant for autograd: shares
+        jump, and what moves an outline is not differentiated.
+
+    Raises:
+        ShapeError: if ``vertices`` is not one mesh that fits the topology, or for a size without pixels.
+        TorchfairError: if a vertex is not finite.
+    """
+    topology.check_vertices(vertices)
+    if vertices.ndim != 2:
+        raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3), not a batch", tuple(vertices.shape))
+    mesh = vertices.detach().to(torch.float64)
+    if not bool(torch.isfinite(mesh).all()):
+        raise TorchfairError("a vertex is not finite: visibility needs positions without NaN and infinity")
+    if samples < 1:
+        raise ShapeError("samples", "at least 1", samples)
+    pixels = height_and_width(size)
+    triangles = triangulate(mesh, topology).triangles
+    ends = mesh[topology.interior_edges]
+    steps = (torch.arange(samples, device=mesh.device, dtype=mesh.dtype) + 0.5) / samples
+    along = torch.lerp(ends[:, :1], ends[:, 1:], steps[:, None]).reshape(-1, 3)
+    normals = face_normals(mesh, topology)[topology.interior_edge_faces]
+    sides = dot(normals, camera.view_directions(ends.mean(1))[..., None, :]).sign()  # (views, I, 2)
+    same_side = sides.prod(-1) > 0
+    seen = [
+        _seen(places, points, triangles, visible_triangles(points, triangles, pixels[1], pixels[0]))
+        for places, points in zip(camera.project(along, size), camera.project(mesh, size), strict=True)
+    ]
+    shares = torch.stack(seen).view(len(seen), -1, samples).to(mesh.dtype).mean(-1)
+    return (same_side * shares).to(vertices)
+
+
+def _seen(places: Tensor, points: Tensor, triangles: Tensor, nearest: Tensor) -> Tensor:
+    """Whether projected places (N, 3) lie on or before the surface at their pixel, inside the picture: (N,)."""
+    height, width = nearest.shape
+    row, column = places[:, 1].floor(), places[:, 0].floor()
+    seen = (row >= 0) & (row < height) & (column >= 0) & (column < width)  # false for NaN, behind the eye
+    inside = torch.nonzero(seen).squeeze(1)
+    triangle = nearest[row[inside].long(), column[inside].long()]
+    covered = inside[triangle >= 0]
+    depths, slopes = plane_depths(points, triangles, triangle[triangle >= 0], places[covered, :2])
+    levels = points[:, 2]
+    levels = levels[torch.isfinite(levels)]
+    extent = levels.amax() - levels.amin() if levels.shape[0] else 0.0
+    seen[covered] = places[covered, 2] <= depths + _SLACK[0] * slopes + _SLACK[1] * extent
+    return seen
