@@ -2,13 +2,16 @@
 
 :func:`load_mesh` and :func:`save_mesh` choose the format by the extension: OBJ, OFF and PLY are read and
 written here and keep polygons, order and orientation; other formats go through trimesh, which is imported
-only then.
+only then. Marked edges, such as principal ones, are line elements of an OBJ file or stand in a JSON file.
 """
 
 from .atomic import atomic_write_bytes as atomic_write_bytes
 from .atomic import atomic_write_text as atomic_write_text
 from .curve_points import CurvePoints as CurvePoints
 from .curve_points import load_curve as load_curve
+from .edge_labels import edge_labels_path as edge_labels_path
+from .edge_labels import load_edge_labels as load_edge_labels
+from .edge_labels import save_edge_labels as save_edge_labels
 from .polygon_mesh import PolygonMesh as PolygonMesh
 from .reading import load_mesh as load_mesh
 from .writing import save_mesh as save_mesh

@@ -1,15 +1,16 @@
 """Wavefront OBJ: vertices and polygons.
 
 Read are ``v x y z`` (colours or a weight behind are ignored) and ``f`` with corners ``v``, ``v/vt``,
-``v//vn`` or ``v/vt/vn``, counted from 1, or from the last vertex backwards if negative. Every other statement
-of the format is skipped; a word that is none of them is an error, because a damaged ``v`` would shift all
-vertex numbers after it. A backslash at the end of a line continues it, except in comments and names, where
-it ends a Windows path.
+``v//vn`` or ``v/vt/vn``, counted from 1, or from the last vertex backwards if negative. Line elements ``l`` are read
+elsewhere (:func:`torchfair.io.load_edge_labels`). Every other statement of the format is skipped; a word that is none
+of them is an error, because a damaged ``v`` would shift all vertex numbers after it. A backslash at the end of a line
+continues it, except in comments and names, where it ends a Windows path.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -34,24 +35,23 @@ def read_obj(path: Path, data: bytes) -> RawMesh:
     Raises:
         MeshFileError: with the line of the fault.
     """
-    text = split_words(_plain_statements(check_text(path, data)))
-    vertex_rows, face_rows = _vertex_and_face_rows(path, text)
+    text = obj_words(path, data)
+    vertex_rows, face_rows = statement_rows(path, text, b"v", b"f")
     points = _read_vertices(path, text, vertex_rows)
-    sizes = text.sizes[face_rows] - 1
-    positions = ranges(text.starts[face_rows] + 1, sizes)
-    if positions.size and b"/" in data:
-        _drop_slashes(path, text, positions)
-    numbers = to_ints(path, text, positions)
-    # a negative number counts back from the last vertex that stands before the face
-    known = np.repeat(np.searchsorted(vertex_rows, face_rows), sizes)
-    corners = np.where((numbers < 0) & (known + numbers >= 0), known + numbers, numbers - 1)
+    corners, sizes = vertex_numbers(path, text, vertex_rows, face_rows, slashes=b"/" in data)
     origin = Origin(path, text.lines[vertex_rows], text.lines[face_rows], first_index=1)
     return assemble(origin, points, corners, sizes)
 
 
-def write_obj(mesh: RawMesh) -> bytes:
-    """The bytes of an OBJ file."""
-    return (vertex_lines(mesh.points, "v ") + face_lines(mesh, prefix="f ", first_index=1)).encode()
+def write_obj(mesh: RawMesh, polylines: Sequence[Ints] = ()) -> bytes:
+    """The bytes of an OBJ file; polylines, two or more vertex numbers each, become line elements."""
+    lines = "".join(f"l {' '.join(map(str, (line + 1).tolist()))}\n" for line in polylines)
+    return (vertex_lines(mesh.points, "v ") + face_lines(mesh, prefix="f ", first_index=1) + lines).encode()
+
+
+def obj_words(path: Path, data: bytes) -> Words:
+    """The words of an OBJ file, statement by statement."""
+    return split_words(_plain_statements(check_text(path, data)))
 
 
 def _plain_statements(data: bytes) -> bytes:
@@ -71,16 +71,41 @@ def _plain_statements(data: bytes) -> bytes:
     return b"\n".join(joined)
 
 
-def _vertex_and_face_rows(path: Path, text: Words) -> tuple[Ints, Ints]:
-    """Lines that begin with ``v`` and lines that begin with ``f``."""
+def statement_rows(path: Path, text: Words, *wanted: bytes) -> list[Ints]:
+    """Lines that begin with each of the ``wanted`` words.
+
+    Raises:
+        MeshFileError: if a line begins with a word that the format does not know.
+    """
     keywords = [text.words[start] for start in text.starts[:-1].tolist()]
     unknown = set(keywords) - _SKIPPED - {b"v", b"f"}
     if unknown:
         row = next(row for row, word in enumerate(keywords) if word in unknown)
         raise MeshFileError(path, f"{quote(keywords[row])} does not start an OBJ statement", int(text.lines[row]))
-    kind_of = dict.fromkeys(keywords, 0) | {b"v": 1, b"f": 2}
+    kind_of = dict.fromkeys(keywords, -1) | {word: kind for kind, word in enumerate(wanted)}
     kinds = np.fromiter(map(kind_of.__getitem__, keywords), np.int8, len(keywords))
-    return np.flatnonzero(kinds == 1), np.flatnonzero(kinds == 2)
+    return [np.flatnonzero(kinds == kind) for kind in range(len(wanted))]
+
+
+def vertex_numbers(
+    path: Path, text: Words, vertex_rows: Ints, rows: Ints, *, slashes: bool, what: str = "a face corner"
+) -> tuple[Ints, Ints]:
+    """Vertex numbers from zero that the statements at ``rows`` hold, and how many each of them has.
+
+    A number that does not exist may come out as anything outside the range of the vertices. Cuts the words of
+    ``text`` down to the vertex; ``slashes`` says whether there may be any to cut off.
+
+    Raises:
+        MeshFileError: if a word is no reference to a vertex.
+    """
+    sizes = text.sizes[rows] - 1
+    positions = ranges(text.starts[rows] + 1, sizes)
+    if slashes and positions.size:
+        _drop_slashes(path, text, positions, what)
+    numbers = to_ints(path, text, positions)
+    # a negative number counts back from the last vertex that stands before the statement
+    known = np.repeat(np.searchsorted(vertex_rows, rows), sizes)
+    return np.where((numbers < 0) & (known + numbers >= 0), known + numbers, numbers - 1), sizes
 
 
 def _read_vertices(path: Path, text: Words, rows: Ints) -> Floats:
@@ -94,7 +119,7 @@ def _read_vertices(path: Path, text: Words, rows: Ints) -> Floats:
     return to_floats(path, text, ranges(first, np.full_like(first, 3))).reshape(-1, 3)
 
 
-def _drop_slashes(path: Path, text: Words, positions: Ints) -> None:
+def _drop_slashes(path: Path, text: Words, positions: Ints, what: str) -> None:
     """Cuts corners such as 1/2/3 down to 1, in place."""
     places = positions.tolist()
     words = [text.words[place] for place in places]
@@ -105,7 +130,7 @@ def _drop_slashes(path: Path, text: Words, positions: Ints) -> None:
     if joined.translate(None, b"0123456789+-/ ") or too_many.any():
         for place, word in zip(places, words, strict=True):
             if not _CORNER.fullmatch(word):
-                fault = f"a face corner must look like 1, 1/2, 1//3 or 1/2/3, got {quote(word)}"
+                fault = f"{what} must look like 1, 1/2, 1//3 or 1/2/3, got {quote(word)}"
                 raise MeshFileError(path, fault, text.line_of(place))
     for place, word in zip(places, words, strict=True):
         text.words[place] = word.partition(b"/")[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from .atomic import atomic_write_bytes
 from .obj import write_obj
 from .off import write_off
 from .ply import write_ply
-from .raw_mesh import RawMesh
+from .raw_mesh import Ints, RawMesh
 
 
 def save_mesh(
@@ -27,6 +28,7 @@ def save_mesh(
     *,
     overwrite: bool = False,
     binary: bool = False,
+    polylines: Sequence[Tensor] = (),
 ) -> None:
     """Writes a polygon mesh; the file appears whole or not at all.
 
@@ -41,10 +43,13 @@ def save_mesh(
         overwrite: whether an existing file may be replaced. Without it, no file is replaced even if it comes
             into being during the call.
         binary: whether to write PLY in (little-endian) binary.
+        polylines: OBJ files only: vertex numbers, two or more each, that are written as line elements, such as from
+            ``PrincipalEdges.polylines``; :func:`load_edge_labels` reads the edges back.
 
     Raises:
         ShapeError: if ``vertices`` is not ``(V, 3)``; a batch has to be written mesh by mesh.
-        MeshError: if a coordinate is not finite, there is no face, or the format does not hold such faces.
+        MeshError: if a coordinate is not finite, there is no face, the format does not hold such faces, or a
+            polyline has fewer than two vertices or one that does not exist.
         MeshFileError: if the extension is unknown or the file cannot be written.
     """
     path = Path(path)
@@ -54,9 +59,11 @@ def save_mesh(
         raise MeshFileError(path, f"cannot write the format {suffix or '(none)'}. Known are {', '.join(known)}")
     if binary and suffix != ".ply":
         raise MeshFileError(path, "only PLY files have a binary form here. Leave out binary=True")
+    if len(polylines) and suffix != ".obj":
+        raise MeshFileError(path, "only OBJ files hold polylines. Use save_edge_labels beside files of other formats")
     mesh = _raw_mesh(vertices, topology)
     if suffix == ".obj":
-        data = write_obj(mesh)
+        data = write_obj(mesh, [_line_points(line, topology) for line in polylines])
     elif suffix == ".off":
         data = write_off(mesh)
     elif suffix == ".ply":
@@ -80,3 +87,15 @@ def _raw_mesh(vertices: Tensor, topology: Topology) -> RawMesh:
             "Nothing was written."
         )
     return RawMesh(points, topology.corners.cpu().numpy(), topology.face_offsets.cpu().numpy())
+
+
+def _line_points(line: Tensor, topology: Topology) -> Ints:
+    if line.ndim != 1 or line.dtype != torch.int64:
+        raise ShapeError("polylines", "vertex numbers (n,) int64", f"{tuple(line.shape)} {line.dtype}")
+    if len(line) < 2 or line.min() < 0 or line.max() >= topology.num_vertices:
+        raise MeshError(
+            f"polylines: expected two or more vertex numbers from 0 to {topology.num_vertices - 1}, "
+            f"got {first_few(line.tolist(), len(line))}"
+        )
+    points: Ints = line.cpu().numpy()
+    return points

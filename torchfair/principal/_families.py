@@ -113,6 +113,13 @@ def mark(rule: Differences, sides: Ints) -> npt.NDArray[np.bool_]:
     return marked
 
 
+def sides_of(rule: Differences, marked: npt.NDArray[np.bool_]) -> Ints:
+    """(F,) a side for each face: the marked one where there is just one, elsewhere carried over from such faces."""
+    of_face = marked[rule.side_edges]
+    clear = np.flatnonzero(of_face.sum(1) == 1)
+    return spread(rule, clear, of_face[clear].argmax(1))
+
+
 def face_components(rule: Differences) -> tuple[Ints, int]:
     """(F,) number of the component that each face is in, connected across edges; and how many there are."""
     from scipy.sparse import coo_array

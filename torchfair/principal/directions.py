@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ..errors import ShapeError, TorchfairError
 from ..geometry import principal_directions, star_normals
-from ..geometry._ops import cross, dot, norm
+from ..geometry._ops import cross, dot
 from ..topology import Topology
 from ._families import Differences, Ints, differences, face_components, mark, seams, spread
 from .labels import require_no_seams
@@ -25,9 +25,10 @@ class AlignedEdges(NamedTuple):
 
     Attributes:
         edges: the choice.
-        misalignment: mean angle in radians, 0 to pi/2, between a principal edge and the direction at its ends, seen
-            along the vertex normals. Near 0 on meshes that follow the directions. Where equilateral triangles lie
-            at random between two orthogonal directions, the best choice has pi/24 = 0.13 on average, 0.26 at worst.
+        misalignment: mean angle in radians, 0 to pi/2, between a principal edge and the mean of the directions at its
+            ends, seen along the vertex normals. Near 0 on meshes that follow the directions. Where equilateral
+            triangles lie at random between two orthogonal directions, the best choice has pi/24 = 0.13 on average,
+            0.26 at worst.
         chosen: (F,) which of the directions, 0 or 1, the principal edge of each face follows; the same in each
             component. With computed directions 0 is that of the larger principal curvature, with its sign.
     """
@@ -73,12 +74,13 @@ def principal_edges_from_directions(
         sides = np.stack([spread(rule, roots, starts, _crossing_costs(rule, of_field)) for of_field in angles])
     options = (sides[:, None] + np.arange(3)[:, None]) % 3  # (fields, 3, F)
     taken = np.take_along_axis(angles[:, None], options[..., None], 3)[..., 0]
-    means = np.stack([[_means(option, components, count) for option in of_field] for of_field in taken])
+    options = options.reshape(3 * len(angles), len(components))
+    taken = taken.reshape(options.shape)
+    means = np.stack([_means(option, components, count) for option in taken])
     _require_directions(topology, means, roots)
-    best = means.reshape(-1, count).argmin(0)[components]
+    best = means.argmin(0)[components]
     faces = np.arange(len(components))
-    final = options.reshape(-1, len(faces))[best, faces]
-    used = taken.reshape(-1, len(faces))[best, faces]
+    final, used = options[best, faces], taken[best, faces]
     edges = PrincipalEdges(topology, torch.from_numpy(mark(rule, final)).to(topology.device))
     misalignment = float(np.nanmean(used)) if used.size else 0.0
     return AlignedEdges(edges, misalignment, torch.from_numpy(best // 3).to(topology.device))
@@ -102,17 +104,18 @@ def _fields(vertices: Tensor, topology: Topology, directions: Tensor | None) -> 
 
 
 def _side_angles(vertices: Tensor, topology: Topology, fields: Tensor, rule: Differences) -> Floats:
-    """(fields, F, 3) mean angle of each side with the directions at its ends, NaN where there is none."""
+    """(fields, F, 3) angle of each side with the mean of the directions at its ends, NaN where there is none."""
     vertices, fields = vertices.detach().to(torch.float64), fields.detach().to(torch.float64)
     ends = topology.edges
     along = (vertices[ends[:, 1]] - vertices[ends[:, 0]])[:, None]
     normals = star_normals(vertices, topology)[ends]
-    along = along - dot(along, normals)[..., None] * normals  # (E, 2, 3), in the tangent planes at both ends
-    at_ends = fields[:, ends]
-    angle = torch.atan2(norm(cross(at_ends, along.expand_as(at_ends))), dot(at_ends, along).abs())
-    known = (at_ends != 0).any(-1)
-    mean = torch.where(known, angle, 0).sum(-1) / known.sum(-1)  # 0/0 is NaN, as wanted
-    values: Floats = mean.cpu().numpy()
+    at_ends = fields[:, ends]  # (fields, E, 2, 3)
+    # Directions have no sign, so angles are doubled before they are averaged. On a curve that bends in the surface
+    # the angles at both ends have opposite signs.
+    flat = torch.complex(dot(at_ends, along), dot(cross(at_ends, along.expand_as(at_ends)), normals))
+    mean = torch.nan_to_num((flat / flat.abs()) ** 2).sum(-1)
+    angle = torch.where(mean.abs() > 1e-9, mean.angle().abs() / 2, torch.nan)
+    values: Floats = angle.cpu().numpy()
     return values[:, rule.side_edges]
 
 
@@ -135,7 +138,7 @@ def _means(values: Floats, components: Ints, count: int) -> Floats:
 
 
 def _require_directions(topology: Topology, means: Floats, roots: Ints) -> None:
-    empty = np.flatnonzero(np.isinf(means).all((0, 1)))
+    empty = np.flatnonzero(np.isinf(means).all(0))
     if empty.size:
         face = roots[empty[0]]
         raise TorchfairError(

@@ -9,12 +9,13 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from .._graph import edge_numbers
 from .._half_edges import first_few
 from ..errors import MeshError, ShapeError
 from ..polylines import join_triples
 from ..subdivision import Refinement
 from ..topology import Topology
-from ._edge_numbers import edge_numbers
+from ._families import differences, sides_of
 
 REGULAR = 6  # the valence of a regular vertex
 
@@ -118,6 +119,9 @@ class PrincipalEdges:
     def refine(self, refinement: Refinement) -> PrincipalEdges:
         """The principal edges of a finer mesh: parts of principal edges, and inner edges parallel to them.
 
+        If there are exceptions, every triangle is asked for its own principal edge first, so that the seams between
+        triangles that disagree do not become broader.
+
         Raises:
             MeshError: if the refinement starts from another mesh, or leads to faces that are not triangles.
         """
@@ -125,7 +129,17 @@ class PrincipalEdges:
             refinement.coarse.corners, self.topology.corners
         ):
             raise MeshError(f"{refinement!r} does not start from the mesh of the principal edges, {self.topology!r}")
-        return PrincipalEdges(refinement.topology, refinement.carry_edge_labels(self.mask, parallel=True))
+        if not self.exceptions.numel():
+            return PrincipalEdges(refinement.topology, refinement.carry_edge_labels(self.mask, parallel=True))
+        rule = differences(self.topology)
+        sides = torch.from_numpy(sides_of(rule, self.mask.cpu().numpy())).to(self.mask.device)
+        edges = self.topology.corner_edges.view(-1, 3).gather(1, sides.clamp(min=0)[:, None]).squeeze(1)
+        wanted = torch.where(sides >= 0, edges, -1)[refinement.face_parents]
+        refinement.topology.require_triangles()
+        fine = refinement.topology.corner_edges.view(-1, 3)
+        mask = torch.zeros(refinement.topology.num_edges, dtype=torch.bool, device=self.mask.device)
+        mask[fine[refinement.edge_parallels[fine, 0] == wanted[:, None]]] = True
+        return PrincipalEdges(refinement.topology, mask)
 
     def to(self, device: torch.device | str) -> PrincipalEdges:
         """The same edges with all tensors on ``device``."""
