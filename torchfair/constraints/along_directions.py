@@ -7,6 +7,7 @@ from dataclasses import replace
 from torch import Tensor
 
 from ..errors import ShapeError
+from ..geometry._ops import dot
 from ..projection import ElementTerm
 
 
@@ -37,7 +38,9 @@ def along_directions(term: ElementTerm, base: Tensor, directions: Tensor, *, blo
     def jacobian(heights: Tensor, places: Tensor, ways: Tensor, *data: Tensor) -> Tensor:
         assert closed is not None
         by_vertices = closed(places + heights * ways, *data)
-        return (by_vertices.reshape(*by_vertices.shape[:-1], *ways.shape) * ways).sum(-1)
+        by_vertices = by_vertices.reshape(*by_vertices.shape[:-1], *ways.shape[-2:])
+        several = term.batched and by_vertices.ndim > ways.ndim  # components of the residual
+        return dot(by_vertices, ways[:, None] if several else ways)
 
     return replace(
         term,

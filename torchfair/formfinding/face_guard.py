@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 from torch import Tensor
 
-from ..geometry import face_normals
+from ..geometry import face_area_vectors
+from ..geometry._ops import dot
 from ..projection.layout import State
 from ..topology import Topology
 
@@ -14,7 +15,7 @@ from ..topology import Topology
 class FaceGuard:
     """Refuses steps in which a face turns over: a guard for :func:`~torchfair.projection.guided_projection`.
 
-    The normals of the last trials are kept, since the state of a step is most often the trial of the one before.
+    The area vectors of the last trials are kept, since the state of a step is most often the trial of the one before.
 
     Args:
         topology: Of the mesh.
@@ -27,13 +28,12 @@ class FaceGuard:
 
     def __call__(self, state: State, trial: State) -> bool:
         """Whether every face of the trial is seen from the side it is seen from in the state."""
-        before, after = self._normals(state), self._normals(trial)
-        return bool(((before * after).sum(1) > 0.0).all())
+        return bool((dot(self._areas(state), self._areas(trial)) > 0.0).all())
 
-    def _normals(self, state: State) -> Tensor:
-        for known, normals in self._known:
+    def _areas(self, state: State) -> Tensor:
+        for known, areas in self._known:
             if known is state:
-                return normals
-        normals = face_normals(self._place(state), self._topology)
-        self._known = [(state, normals), *self._known[:2]]
-        return normals
+                return areas
+        areas = face_area_vectors(self._place(state), self._topology)
+        self._known = [(state, areas), *self._known[:2]]
+        return areas

@@ -14,8 +14,15 @@ from .system import Evaluation, Structure
 from .term import ElementTerm
 
 
-def residual_table(terms: Sequence[ElementTerm], state: State) -> list[TermResidual]:
-    """Mean and largest residual of every term; terms of one name share a row."""
+def residual_table(structure: Structure, terms: Sequence[ElementTerm], at: Evaluation) -> list[TermResidual]:
+    """Mean and largest residual of every term; terms of one name share a row.
+
+    Args:
+        structure: The problem.
+        terms: All its terms, also those without elements or weight.
+        at: A state whose residuals are known.
+    """
+    known = {id(c.term): pair for c, *pair in zip(structure.compiled, at.arguments, at.values, strict=True)}
     groups: dict[str, list[ElementTerm]] = {}
     for term in terms:
         groups.setdefault(term.name, []).append(term)
@@ -25,8 +32,11 @@ def residual_table(terms: Sequence[ElementTerm], state: State) -> list[TermResid
         for term in members:
             if not term.num_elements:
                 continue
-            arguments = term.arguments(state)
-            values = term.values(arguments)
+            if id(term) in known:
+                arguments, values = known[id(term)]
+            else:
+                arguments = term.arguments(at.state)
+                values = term.values(arguments)
             norms.append(torch.linalg.vector_norm(values, dim=1).double().cpu())
             share += float(term.contributions(arguments, values).sum())
         norm = torch.cat(norms)

@@ -51,7 +51,7 @@ class Iteration:
         self.timings = {"linearise": 0.0, "solve": 0.0, "merit": 0.0}
         self.best = self._evaluate({name: block.detach().clone() for name, block in blocks.items()})
         check_start(problem.structure, self.best)
-        self.initial_residuals = residual_table(problem.terms, self.best.state)
+        self.initial_residuals = residual_table(problem.structure, problem.terms, self.best)
         self.damping = Damping(settings.initial_damping)
         self.accuracy = settings.accuracy
         self.quantities: dict[str, float] = {}
@@ -76,7 +76,7 @@ class Iteration:
             blocks=dict(self.best.state),
             status=status,
             message=f"{status.value}; {detail}" if detail else status.value,
-            residuals=residual_table(self.problem.terms, self.best.state),
+            residuals=residual_table(self.problem.structure, self.problem.terms, self.best),
             initial_residuals=self.initial_residuals,
             history=self.history,
             solver=self.problem.solver.name,

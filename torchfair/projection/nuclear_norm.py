@@ -45,9 +45,9 @@ def symmetric_components(matrix: Tensor) -> Tensor:
 
 def symmetric_matrix(components: Tensor) -> Tensor:
     """Matrices (..., 3, 3) with the given :func:`symmetric_components`; differentiable."""
-    xx, yy, zz, yz, xz, xy = (components / _factors(components)).unbind(-1)
-    matrix = torch.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], dim=-1)
-    return matrix.reshape(*components.shape[:-1], 3, 3)
+    scaled = components / _factors(components)
+    entries = torch.tensor([0, 5, 4, 5, 1, 3, 4, 3, 2], device=components.device)
+    return scaled.index_select(-1, entries).reshape(*components.shape[:-1], 3, 3)
 
 
 def _pairs(device: torch.device) -> tuple[Tensor, Tensor]:
@@ -63,7 +63,18 @@ def _factors(like: Tensor) -> Tensor:
 
 
 def _turned_basis(vectors: Tensor) -> Tensor:
-    """(n, 6, 6) maps from components of W to those of ``U^T W U``."""
-    basis = symmetric_matrix(torch.eye(6, dtype=vectors.dtype, device=vectors.device))
-    turned = torch.einsum("nai,cab,nbj->ncij", vectors, basis, vectors)
-    return symmetric_components(turned).transpose(1, 2)
+    """(n, 6, 6) maps from components of W to those of ``U^T W U``, for U (n, 3, 3).
+
+    Component ``ij`` of the latter is ``sum_ab U_ai W_ab U_bj``, over a and b.
+    """
+    i, j = _pairs(vectors.device)
+    factors = _factors(vectors)
+    rows = vectors.flatten(1).T.contiguous()  # elements last: operations on long rows are faster
+
+    def entries(a: Tensor, i: Tensor) -> Tensor:
+        return rows.index_select(0, (3 * a + i[:, None]).flatten())
+
+    both = entries(i, i) * entries(j, j) + entries(j, i) * entries(i, j)
+    # Diagonal entries W_aa appear once in the sum, but twice in ``both``.
+    shares = factors[:, None] / torch.where(i == j, 2.0 * factors, factors)
+    return (both * shares.flatten()[:, None]).T.reshape(-1, 6, 6)

@@ -192,7 +192,7 @@ class LinearSystem:
 def _scaled(jacobians: Tensor, root: Tensor) -> Tensor:
     """Jacobians (n, m, K) times their roots, as (m, K, n)."""
     if root.ndim == 3:
-        return torch.einsum("nij,njk->ikn", root, jacobians).contiguous()
+        return torch.bmm(root, jacobians.contiguous()).permute(1, 2, 0).contiguous()
     local = jacobians.permute(1, 2, 0)
     return torch.mul(local, root, out=torch.empty_like(local, memory_format=torch.contiguous_format))
 

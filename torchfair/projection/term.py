@@ -45,6 +45,9 @@ class ElementTerm:
         jacobian: Closed form of the derivative of the residual, ``(m, k_1 d_1 + k_2 d_2 + ...)`` or, for a
             scalar residual, ``(k_1 d_1 + ...,)``; by default ``torch.func`` differentiates.
         linear: The residual is affine in the state and has no refresh: differentiated only once.
+        batched: :attr:`residual`, :attr:`merit` and :attr:`jacobian` take all n elements at once, ``(n, k, d)`` and
+            data ``(n, ...)``, and return results with n rows: faster where closed forms are written for it. Rows
+            must not depend on each other.
     """
 
     name: str
@@ -58,6 +61,7 @@ class ElementTerm:
     merit: Residual | None = None
     jacobian: Residual | None = None
     linear: bool = False
+    batched: bool = False
 
     @property
     def num_elements(self) -> int:
@@ -103,11 +107,11 @@ class ElementTerm:
 
     def values(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Residuals ``(n, m)``."""
-        return as_rows(torch.func.vmap(self.residual)(*arguments))
+        return as_rows(self._mapped(self.residual)(*arguments))
 
     def contributions(self, arguments: tuple[Tensor, ...], residuals: Tensor) -> Tensor:
         """(n,) merit of every element."""
-        own = self.loss.value(residuals) if self.merit is None else torch.func.vmap(self.merit)(*arguments)
+        own = self.loss.value(residuals) if self.merit is None else self._mapped(self.merit)(*arguments)
         value = self.weight * own
         return value if self.element_weights is None else value * self.element_weights
 
@@ -115,14 +119,21 @@ class ElementTerm:
         """Residuals ``(n, m)`` and Jacobians ``(n, m, K)``, K unknowns of the stencil in order."""
         if self.jacobian is not None:
             return self.values(arguments), self.jacobians(arguments)
-        return differentiate(self.residual, arguments, len(self.stencil))
+        return differentiate(self.residual, arguments, len(self.stencil), batched=self.batched)
 
     def jacobians(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Jacobians ``(n, m, K)``."""
         if self.jacobian is None:
-            return differentiate(self.residual, arguments, len(self.stencil))[1]
-        closed = torch.func.vmap(self.jacobian)(*arguments)
+            return self.derivatives(arguments)[1]
+        closed = self._mapped(self.jacobian)(*arguments)
         return closed if closed.ndim == 3 else closed[:, None]
+
+    def _mapped(self, function: Residual) -> Residual:
+        """A function of all elements at once."""
+        if self.batched:
+            return function
+        mapped: Residual = torch.func.vmap(function)
+        return mapped
 
 
 def as_rows(values: Tensor) -> Tensor:
@@ -130,7 +141,9 @@ def as_rows(values: Tensor) -> Tensor:
     return values[:, None] if values.ndim == 1 else values
 
 
-def differentiate(residual: Residual, arguments: tuple[Tensor, ...], count: int) -> tuple[Tensor, Tensor]:
+def differentiate(
+    residual: Residual, arguments: tuple[Tensor, ...], count: int, *, batched: bool = False
+) -> tuple[Tensor, Tensor]:
     """Residuals ``(n, m)`` and Jacobians ``(n, m, K)`` with respect to the first ``count`` arguments.
 
     Elements do not depend on each other, so the gradient of the sum of one component over all elements
@@ -139,11 +152,12 @@ def differentiate(residual: Residual, arguments: tuple[Tensor, ...], count: int)
     """
     local = [a.detach().requires_grad_() for a in arguments[:count]]
     with torch.enable_grad():
-        values = as_rows(torch.func.vmap(residual)(*local, *arguments[count:]))
+        values = as_rows((residual if batched else torch.func.vmap(residual))(*local, *arguments[count:]))
         totals = values.sum(0).unbind() if values.requires_grad else ()
     outputs, inputs = values.shape[1], sum(a[0].numel() for a in local) if values.shape[0] else 0
     if outputs > inputs > 0:
-        return values.detach(), _forward_jacobian(residual, arguments, count)
+        one = (lambda *inputs: residual(*(part[None] for part in inputs))[0]) if batched else residual
+        return values.detach(), _forward_jacobian(one, arguments, count)
     rows = []
     for total in totals:
         gradients = torch.autograd.grad(total, local, retain_graph=True, materialize_grads=True)
