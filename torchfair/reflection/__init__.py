@@ -1,15 +1,23 @@
 """Reflections of meshes: their variation in closed form, pictures, and the score of a picture."""
 
 from .camera import Camera as Camera
+from .default_views import default_camera as default_camera
+from .default_views import default_stripe_directions as default_stripe_directions
 from .edge_visibility import edge_visibility as edge_visibility
 from .environments import Checker as Checker
 from .environments import Environment as Environment
 from .environments import EquirectangularImage as EquirectangularImage
 from .environments import Stripes as Stripes
+from .loss import ReflectionLoss as ReflectionLoss
 from .orthographic_camera import OrthographicCamera as OrthographicCamera
 from .perspective_camera import PerspectiveCamera as PerspectiveCamera
 from .render import Reflection as Reflection
 from .render import render_reflection as render_reflection
+from .score import ReflectionScore as ReflectionScore
+from .score import reflection_score as reflection_score
+from .setup import Pictures as Pictures
+from .setup import ReflectionSetup as ReflectionSetup
+from .smooth_reference import SmoothReference as SmoothReference
 from .variation import ReflectionVariation as ReflectionVariation
 from .variation import reflection_variation as reflection_variation
 from .variation import reflection_variation_per_edge as reflection_variation_per_edge

@@ -1,0 +1,111 @@
+"""The reflection score as a loss for training loops."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from ..energies.base import MeshModule
+from ..errors import TorchfairError
+from ..geometry import face_areas
+from ..topology import Topology
+from ._comparison import comparison_window, dissimilarity
+from .camera import Camera, Size
+from .setup import ReflectionSetup
+from .smooth_reference import Reference
+from .variation import reflection_variation
+
+
+class ReflectionLoss(MeshModule):
+    """``1 - SSIM`` of reflections, differentiable, plus a share of the reflection variation.
+
+    ``forward(vertices)`` (*batch, V, 3) -> (*batch,). The first part is the score of
+    :func:`~torchfair.reflection.reflection_score` at one antialiased sample per pixel. Its gradient holds the motion
+    of edges in the picture, without which it would point nowhere (see
+    :func:`~torchfair.reflection.render_reflection`). Which pixels are compared is worked out anew in every call and
+    not differentiated.
+
+    The second part is ``variation_weight`` times the mean dual reflection variation over the six axis directions,
+    4/3 E, divided by the square root of the area (of the reference if there is one): dimensionless. Pictures are rough
+    functions of the vertices, and this part helps them along; alone it makes slivers and creases.
+
+    Args:
+        topology: connectivity of all meshes that the module is called with.
+        reference: a mesh ``(vertices, topology)``, an analytic surface, a
+            :class:`~torchfair.reflection.SmoothReference` or a :class:`~torchfair.reflection.ReflectionSetup`; a
+            setup without reference compares every mesh with itself, shaded by its vertex normals.
+        variation_weight: see above, at least 0.
+        camera: as for :func:`~torchfair.reflection.reflection_score`; a setup brings its own.
+        stripe_directions: likewise.
+        frequency: likewise.
+        size: pixels of the pictures, also in place of those of a setup.
+
+    Raises:
+        ShapeError: if a tensor has the wrong shape.
+        TorchfairError: for a negative weight, or a reference of another kind.
+    """
+
+    reference_images: Tensor | None
+    reference_coverage: Tensor | None
+    reference_area: Tensor | None
+
+    def __init__(
+        self,
+        topology: Topology,
+        reference: Reference | ReflectionSetup,
+        *,
+        variation_weight: float = 0.0,
+        camera: Camera | None = None,
+        stripe_directions: Tensor | None = None,
+        frequency: float | None = None,
+        size: Size = 128,
+    ) -> None:
+        super().__init__(topology)
+        if not variation_weight >= 0:
+            raise TorchfairError(f"variation_weight must be at least 0, got {variation_weight}")
+        if isinstance(reference, ReflectionSetup):
+            setup = replace(reference, size=size)
+        else:
+            setup = ReflectionSetup.for_reference(
+                reference, camera=camera, stripe_directions=stripe_directions, frequency=frequency, size=size
+            )
+        self.setup = setup
+        self.variation_weight = variation_weight
+        images = coverage = area = None
+        if setup.reference is not None:
+            images, _, coverage = setup.reference_pictures
+            area = face_areas(setup.reference.vertices, setup.reference.topology).sum()
+        for name, tensor in (("images", images), ("coverage", coverage), ("area", area)):
+            self.register_buffer(f"reference_{name}", tensor, persistent=False)
+
+    def forward(self, vertices: Tensor) -> Tensor:
+        """Loss (*batch,) of ``vertices`` (*batch, V, 3)."""
+        loss = self.dissimilarity(vertices)
+        if self.variation_weight > 0:
+            loss = loss + self.variation_weight * self.variation(vertices)
+        return loss
+
+    def dissimilarity(self, vertices: Tensor) -> Tensor:
+        """Mean ``1 - SSIM`` (*batch,) over views and stripe directions, 0 where nothing can be compared."""
+        rendering = replace(self.setup, supersampling=1)
+        flat = rendering.flat(vertices, self.topology, antialias=True)
+        if self.reference_images is None or self.reference_coverage is None:
+            images, _, coverage = rendering.smooth(vertices, self.topology)
+        else:
+            images, coverage = self.reference_images.to(vertices), self.reference_coverage.to(vertices)
+        window = comparison_window(flat.coverage.detach(), coverage.detach())
+        per_view = dissimilarity(flat.stripes, images, window).mean(-1)
+        return per_view.sum(-1) / window.any(-1).any(-1).sum(-1).clamp(min=1)
+
+    def variation(self, vertices: Tensor) -> Tensor:
+        """Mean dual reflection variation (*batch,) divided by the square root of the area."""
+        area = face_areas(vertices, self.topology).sum(-1) if self.reference_area is None else self.reference_area
+        area = area.to(vertices).clamp(min=torch.finfo(vertices.dtype).tiny)
+        return reflection_variation(vertices, self.topology, form="dual").mean(-1) / area.sqrt()
+
+    def extra_repr(self) -> str:
+        """The topology and the choices in words."""
+        views, size = self.setup.camera.num_views, self.setup.size
+        return f"{self.topology!r}, {views} views, size={size}, variation_weight={self.variation_weight:g}"

@@ -1,0 +1,168 @@
+"""What meshes are compared in: views, stripes, and the pictures of a smooth reference."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from ..errors import TorchfairError
+from ..topology import Topology
+from .camera import Camera, Size
+from .default_views import default_camera, default_stripe_directions
+from .environments import Stripes
+from .render import render_reflection
+from .smooth_reference import Reference, SmoothReference, smooth_reference
+
+STRIPES = 4.0
+"""Stripe pairs over the mirrored directions of the reference, if no frequency is given."""
+_FEWEST_RADIANS = 0.05
+_PROBE = 96
+
+
+class Pictures(NamedTuple):
+    """Reflections of one mesh in all views.
+
+    Attributes:
+        stripes: (*batch, views, k, H, W) in 0..1, one channel per stripe direction.
+        mirrored: (*batch, views, 3, H, W) mean mirrored direction of each pixel.
+        coverage: (*batch, views, H, W) in 0..1.
+    """
+
+    stripes: Tensor
+    mirrored: Tensor
+    coverage: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class ReflectionSetup:
+    """The same views and stripes for any number of meshes, and what they are compared with.
+
+    Make one with :meth:`for_reference` and use it for all meshes of a comparison: scores are comparable in one setup
+    only.
+
+    Attributes:
+        camera: the views.
+        stripes: the surroundings.
+        reference: the smooth surface; None to compare every mesh with itself, shaded by its vertex normals.
+        size: pixels of the pictures.
+        supersampling: samples per pixel along each side.
+    """
+
+    camera: Camera
+    stripes: Stripes
+    reference: SmoothReference | None
+    size: Size = 256
+    supersampling: int = 3
+
+    @classmethod
+    def for_reference(
+        cls,
+        reference: Reference,
+        *,
+        camera: Camera | None = None,
+        stripe_directions: Tensor | None = None,
+        frequency: float | None = None,
+        size: Size = 256,
+        supersampling: int = 3,
+    ) -> ReflectionSetup:
+        """A setup that suits a smooth reference.
+
+        Args:
+            reference: a mesh ``(vertices, topology)``, an analytic surface or a :class:`SmoothReference`.
+            camera: the views, by default those of :func:`default_camera`.
+            stripe_directions: (k, 3), by default those of :func:`default_stripe_directions`.
+            frequency: stripe pairs per unit of ``w.r``; by default such that the directions mirrored by the
+                reference run through about four stripe pairs, whatever its curvature.
+            size: pixels of the pictures.
+            supersampling: samples per pixel along each side.
+
+        Raises:
+            ShapeError: if a tensor has the wrong shape.
+            TorchfairError: if a vertex is not finite, or a frequency not positive.
+        """
+        surface = smooth_reference(reference)
+        camera = camera or default_camera(surface)
+        waves = default_stripe_directions(surface) if stripe_directions is None else stripe_directions
+        if frequency is None:
+            frequency = _frequency(surface, camera, waves)
+        return cls(camera, Stripes(waves, frequency), surface, size, supersampling)
+
+    def without_reference(self) -> ReflectionSetup:
+        """The same views and stripes, in which every mesh is compared with itself."""
+        return replace(self, reference=None)
+
+    def flat(self, vertices: Tensor, topology: Topology, *, antialias: bool = False) -> Pictures:
+        """Pictures of a mesh (*batch, V, 3) of plane mirrors, one for every face."""
+        picture = render_reflection(
+            vertices,
+            topology,
+            self.camera,
+            self._surroundings,
+            size=self.size,
+            supersampling=self.supersampling,
+            antialias=antialias,
+        )
+        return _split(picture.image, picture.coverage)
+
+    def smooth(self, vertices: Tensor, topology: Topology, normals: Tensor | None = None) -> Pictures:
+        """Pictures of a mesh (*batch, V, 3) that mirrors with blended normals, by default its vertex normals."""
+        picture = render_reflection(
+            vertices,
+            topology,
+            self.camera,
+            self._surroundings,
+            size=self.size,
+            supersampling=self.supersampling,
+            shading="smooth",
+            normals=normals,
+        )
+        return _split(picture.image, picture.coverage)
+
+    @cached_property
+    def reference_pictures(self) -> Pictures:
+        """Pictures of the reference.
+
+        Raises:
+            TorchfairError: if there is none.
+        """
+        if self.reference is None:
+            raise TorchfairError("this setup has no reference: every mesh is compared with itself")
+        with torch.no_grad():
+            return self.smooth(self.reference.vertices, self.reference.topology, self.reference.normals)
+
+    def pictures_to_match(self, vertices: Tensor, topology: Topology) -> Pictures:
+        """What a mesh is compared with: the reference, or the mesh itself shaded by its vertex normals."""
+        return self.smooth(vertices, topology) if self.reference is None else self.reference_pictures
+
+    def _surroundings(self, directions: Tensor) -> Tensor:
+        return torch.cat([self.stripes(directions), directions], dim=-1)
+
+
+def _split(image: Tensor, coverage: Tensor) -> Pictures:
+    return Pictures(image[..., :-3, :, :], image[..., -3:, :, :], coverage)
+
+
+def _frequency(surface: SmoothReference, camera: Camera, waves: Tensor) -> float:
+    """Stripe pairs per unit of ``w.r`` at which the reference shows about :data:`STRIPES` of them."""
+    with torch.no_grad():
+        probe = render_reflection(
+            surface.vertices,
+            surface.topology,
+            camera,
+            lambda r: r,
+            size=_PROBE,
+            shading="smooth",
+            normals=surface.normals,
+        )
+    directions = probe.image.movedim(-3, -1)[probe.coverage > 0.999]
+    if directions.shape[0] < 2:
+        return 1.0
+    unit = torch.nn.functional.normalize(torch.as_tensor(waves).to(directions), dim=-1)
+    ends = torch.quantile(directions @ unit.T, directions.new_tensor([0.05, 0.95]), dim=0)
+    spread = float((ends[1] - ends[0]).mean()) / 0.9
+    return STRIPES / max(spread, 2 * math.sin(_FEWEST_RADIANS / 2))
