@@ -14,7 +14,7 @@ class Triangulation(NamedTuple):
     """Triangles that cover the faces of a mesh, in the order of the faces.
 
     Attributes:
-        triangles: ``(T, 3)`` vertex numbers, in the orientation of their face.
+        triangles: ``(*batch, T, 3)`` vertex numbers, in the orientation of their face.
         faces: ``(T,)`` the face each triangle is part of.
     """
 
@@ -23,7 +23,7 @@ class Triangulation(NamedTuple):
 
 
 def triangulate(vertices: Tensor, topology: Topology) -> Triangulation:
-    """Fans of triangles over the faces, one mesh ``(V, 3)``.
+    """Fans of triangles over the faces of meshes ``(*batch, V, 3)``; the same number for each mesh of the batch.
 
     Each polygon is fanned from the corner whose smallest triangle is the largest, measured along the area vector
     of the polygon. That covers every polygon exactly which is convex or star-shaped from one of its corners, so
@@ -35,12 +35,14 @@ def triangulate(vertices: Tensor, topology: Topology) -> Triangulation:
         candidates = corners[:, fans]  # (n, first corner, triangle, 3)
         if size > 3:
             candidates = candidates[torch.arange(len(numbers), device=corners.device), _best_fan(vertices, candidates)]
-        triangles.append(candidates.reshape(-1, 3))
+            triangles.append(candidates.flatten(-3, -2))
+        else:
+            triangles.append(candidates.view(-1, 3).expand(*vertices.shape[:-2], -1, -1))
         faces.append(numbers.repeat_interleave(size - 2))
     if not triangles:
-        return Triangulation(topology.corners.view(0, 3), topology.corners)
+        return Triangulation(topology.corners.view(0, 3).expand(*vertices.shape[:-2], 0, 3), topology.corners)
     order = torch.cat(faces).argsort(stable=True)
-    return Triangulation(torch.cat(triangles)[order], torch.cat(faces)[order])
+    return Triangulation(torch.cat(triangles, dim=-2)[..., order, :], torch.cat(faces)[order])
 
 
 def _fans(size: int, device: torch.device) -> Tensor:
@@ -51,8 +53,8 @@ def _fans(size: int, device: torch.device) -> Tensor:
 
 
 def _best_fan(vertices: Tensor, candidates: Tensor) -> Tensor:
-    """(n,) the first corner of the best fan of each polygon."""
-    a, b, c = vertices.detach()[candidates].unbind(-2)
-    areas = torch.linalg.cross(b - a, c - a)  # (n, first corner, triangle, 3)
-    signed: Tensor = (areas * areas.sum(2, keepdim=True)).sum(-1)
+    """(*batch, n) the first corner of the best fan of each polygon."""
+    a, b, c = vertices.detach()[..., candidates, :].unbind(-2)
+    areas = torch.linalg.cross(b - a, c - a)  # (*batch, n, first corner, triangle, 3)
+    signed: Tensor = (areas * areas.sum(-2, keepdim=True)).sum(-1)
     return signed.amin(-1).argmax(-1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import torch
@@ -57,19 +58,46 @@ def rasterise(points: Tensor, triangles: Tensor, width: int, height: int) -> Fra
     return Fragments(face_index, depth, barycentric)
 
 
-def visible_triangles(points: Tensor, triangles: Tensor, width: int, height: int) -> Tensor:
-    """The ``face_index`` of :func:`rasterise` alone."""
+def visible_triangles(
+    points: Tensor,
+    triangles: Tensor,
+    width: int,
+    height: int,
+    *,
+    pictures: Tensor | None = None,
+    num_pictures: int | None = None,
+) -> Tensor:
+    """The ``face_index`` of :func:`rasterise` alone, for one picture or for several of the same size at once.
+
+    Args:
+        points: ``(V, 3)`` of all pictures.
+        triangles: ``(T, 3)`` of all pictures.
+        width: number of columns.
+        height: number of rows.
+        pictures: ``(T,)`` picture that each triangle is drawn in; with ``num_pictures`` the result is
+            ``(num_pictures, height, width)``.
+        num_pictures: number of pictures.
+    """
     _check(points, triangles, width, height)
-    nearest = torch.full((height * width,), _FAR, device=points.device)
+    shape = (height, width) if num_pictures is None else (num_pictures, height, width)
+    nearest = torch.full((math.prod(shape),), _FAR, device=points.device)
     spans = triangle_spans(points, triangles, width, height)
-    first_pixel = spans.row * width + spans.start
-    first_level, level_step = _quantise(spans)
+    picture = spans.triangle.new_zeros(()).expand_as(spans.triangle)
+    if pictures is not None:
+        picture = pictures.index_select(0, spans.triangle)
+    first_pixel = (picture * height + spans.row) * width + spans.start
+    first_level, level_step = _quantise(spans, picture, num_pictures or 1)
     for span, offset in span_chunks(spans):
         level = first_level.index_select(0, span) + level_step.index_select(0, span) * offset
         key = (level.to(torch.int64) << 32) | spans.triangle.index_select(0, span)
         nearest.scatter_reduce_(0, first_pixel.index_select(0, span) + offset, key, "amin")
-    seen = nearest.bitwise_and_(_LOW_BITS)  # in place: the buffer is large
-    return seen.masked_fill_(seen == _LOW_BITS, -1).view(height, width)
+    return unpack_nearest(nearest).view(shape)
+
+
+def unpack_nearest(keys: Tensor) -> Tensor:
+    """Numbers in the low half of the smallest keys, -1 where there was none; overwrites ``keys``."""
+    seen = keys.bitwise_and_(_LOW_BITS)  # in place: the buffer is large
+    return seen.masked_fill_(seen == _LOW_BITS, -1)
 
 
 def interpolate(points: Tensor, triangles: Tensor, face_index: Tensor) -> tuple[Tensor, Tensor]:
@@ -111,15 +139,21 @@ def _affine_tables(points: Tensor, triangles: Tensor) -> Tensor:
     return torch.cat([torch.cat([origin, first, second], dim=1), background])
 
 
-def _quantise(spans: Spans) -> tuple[Tensor, Tensor]:
-    """Depths of spans as levels in ``0 .. 2^31 - 1``: first pixel and step."""
-    if spans.length.shape[0] == 0:
-        return spans.depth, spans.depth_step
+def _quantise(spans: Spans, picture: Tensor, num_pictures: int) -> tuple[Tensor, Tensor]:
+    """Depths of spans as levels in ``0 .. 2^31 - 1`` of the range of their picture: first pixel and step."""
     last = spans.depth + spans.depth_step * (spans.length - 1)
-    nearest = torch.minimum(spans.depth, last).amin()
-    extent = torch.maximum(spans.depth, last).amax() - nearest
-    scale = _DEPTH_LEVELS / torch.where(extent > 0, extent, 1)
-    return (spans.depth - nearest) * scale, spans.depth_step * scale
+    lower, upper = torch.minimum(spans.depth, last), torch.maximum(spans.depth, last)
+    origin, scale = depth_levels(lower, upper, picture, num_pictures)
+    scale = scale.index_select(0, picture)
+    return (spans.depth - origin.index_select(0, picture)) * scale, spans.depth_step * scale
+
+
+def depth_levels(lower: Tensor, upper: Tensor, picture: Tensor, num_pictures: int) -> tuple[Tensor, Tensor]:
+    """Origin and scale (pictures,) that map depths between ``lower`` and ``upper`` (n,) to ``0 .. 2^31 - 1``."""
+    low = lower.new_full((num_pictures,), torch.inf).scatter_reduce_(0, picture, lower, "amin")
+    high = lower.new_full((num_pictures,), -torch.inf).scatter_reduce_(0, picture, upper, "amax")
+    extent = high - low
+    return low, _DEPTH_LEVELS / torch.where(extent > 0, extent, 1)
 
 
 def _check(points: Tensor, triangles: Tensor, width: int, height: int) -> None:

@@ -41,7 +41,7 @@ def triangle_spans(points: Tensor, triangles: Tensor, width: int, height: int) -
     corners = torch.where(torch.isfinite(corners).all(-1).all(-1)[:, None, None], corners, 0)
     top = _first_centre(corners[..., 1].amin(1), height)
     bottom = _first_centre(corners[..., 1].amax(1), height)
-    triangle, offset = _expand((bottom - top).clamp(min=0))
+    triangle, offset = expand_counts((bottom - top).clamp(min=0))
     row = top[triangle] + offset
     left, right = _crossings(corners, triangle, row.to(torch.float64) + 0.5)
     start, stop = _first_centre(left, width), _first_centre(right, width)
@@ -60,11 +60,11 @@ def span_chunks(spans: Spans) -> Iterator[tuple[Tensor, Tensor]]:
     cuts = torch.searchsorted(ends, marks).tolist()
     for begin, end in itertools.pairwise([0, *cuts, ends.shape[0]]):
         if end > begin:
-            span, offset = _expand(spans.length[begin:end])
+            span, offset = expand_counts(spans.length[begin:end])
             yield span + begin, offset
 
 
-def _expand(counts: Tensor) -> tuple[Tensor, Tensor]:
+def expand_counts(counts: Tensor) -> tuple[Tensor, Tensor]:
     """Item number and position within the item, for every unit of ``counts``."""
     item = torch.repeat_interleave(counts)
     begin = counts.cumsum(0) - counts

@@ -9,6 +9,7 @@ from .environments import Environment as Environment
 from .environments import EquirectangularImage as EquirectangularImage
 from .environments import Stripes as Stripes
 from .loss import ReflectionLoss as ReflectionLoss
+from .mirror import mirror_directions as mirror_directions
 from .orthographic_camera import OrthographicCamera as OrthographicCamera
 from .perspective_camera import PerspectiveCamera as PerspectiveCamera
 from .render import Reflection as Reflection

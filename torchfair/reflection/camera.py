@@ -39,17 +39,30 @@ class Camera(ABC):
     def origins(self) -> Tensor:
         """``(views, 3)`` a point on the line of sight: the eye if there is one, else the target."""
 
+    @property
     @abstractmethod
-    def to_screen(self, local: Tensor, size: Size) -> Tensor:
+    def near(self) -> Tensor | None:
+        """``(views,)`` least distance along the line of sight at which something is seen; None if anything is."""
+
+    @abstractmethod
+    def to_screen(self, local: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
         """Pixel coordinates x, y and a depth, from what :meth:`local` gives: the same shape.
 
         The depth grows away from the eye and is affine over the picture: distance along the line of sight for
         parallel views, ``-1 / distance`` for perspective. Points at or behind an eye become NaN.
+
+        Args:
+            local: (*batch, views, N, 3), or (N, 3) if ``view`` is given.
+            size: of the picture.
+            view: (N,) number of the view of each point.
         """
 
     @abstractmethod
-    def directions_at(self, pixels: Tensor, size: Size) -> Tensor:
-        """Unit directions (views, *any, 3) from the eye into the scene at places (views, *any, 2) of the picture."""
+    def directions_at(self, pixels: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
+        """Unit directions (views, *any, 3) from the eye into the scene at places (views, *any, 2) of the picture.
+
+        With ``view`` (N,), the number of the view of each place: (N, 3) at places (N, 2).
+        """
 
     @abstractmethod
     def view_directions(self, points: Tensor) -> Tensor:

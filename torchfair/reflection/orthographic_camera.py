@@ -85,17 +85,24 @@ class OrthographicCamera(Camera):
         """``(views, 3)`` the targets."""
         return self.targets
 
-    def to_screen(self, local: Tensor, size: Size) -> Tensor:
+    @property
+    def near(self) -> None:
+        """None: a parallel view has no eye for things to be behind."""
+
+    def to_screen(self, local: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
         """Pixel coordinates x, y and distance along the line of sight, from what :meth:`local` gives."""
         height, width = height_and_width(size)
         right, up, forward = local.unbind(-1)
-        scale = (width / (2 * self.half_widths)).to(local)[:, None]
+        scale = (width / (2 * self.half_widths)).to(local)
+        scale = scale[:, None] if view is None else scale[view]
         return torch.stack([width / 2 + scale * right, height / 2 - scale * up, forward], dim=-1)
 
-    def directions_at(self, pixels: Tensor, size: Size) -> Tensor:
+    def directions_at(self, pixels: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
         """The direction of each view, repeated for every place ``(views, *any, 2)``: (views, *any, 3)."""
-        shape = (self.num_views, *[1] * (pixels.ndim - 2), 3)
-        return self.directions.to(pixels).view(shape).expand(*pixels.shape[:-1], 3)
+        directions = self.directions.to(pixels)
+        if view is not None:
+            return directions[view]
+        return directions.view(-1, *[1] * (pixels.ndim - 2), 3).expand(*pixels.shape[:-1], 3)
 
     def view_directions(self, points: Tensor) -> Tensor:
         """The direction of each view, repeated for points ``(*batch, N, 3)``: (*batch, views, N, 3)."""

@@ -1,0 +1,123 @@
+"""All pictures of a batch in all views as one list of points, triangles and edges on the screen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from ..geometry._ops import cross, dot
+from ..topology import Topology
+from ..triangulation import triangulate
+from ._clip import clip_edges, clip_triangles
+from .camera import Camera, Size
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Picture ``b views + i`` is mesh b of the batch in view i.
+
+    Attributes:
+        num_meshes: meshes in the batch.
+        num_views: views of each.
+        points: (P, 3) pixel coordinates and depth, differentiable.
+        vertices: (N,) vertex, numbered through the batch, of the first N points.
+        blends: (P - N, 2) the two points that each further point lies between, where something was cut away.
+        weights: (P - N,) share of the second of them.
+        triangles: (T, 3) points.
+        faces: (T,) face of each triangle.
+        pictures: (T,) picture of each triangle.
+        edges: (E, 2) points: the edges of the mesh, and cuts through polygons along which they fold on the screen.
+        edge_faces: (E, 2) faces beside each edge, one of them twice where there is no other.
+        edge_pictures: (E,) picture of each edge.
+    """
+
+    num_meshes: int
+    num_views: int
+    points: Tensor
+    vertices: Tensor
+    blends: Tensor
+    weights: Tensor
+    triangles: Tensor
+    faces: Tensor
+    pictures: Tensor
+    edges: Tensor
+    edge_faces: Tensor
+    edge_pictures: Tensor
+
+    @property
+    def num_pictures(self) -> int:
+        """Meshes times views."""
+        return self.num_meshes * self.num_views
+
+    def at_points(self, values: Tensor) -> Tensor:
+        """Values (P, d) at the points from values (vertices of the batch, d) at the vertices."""
+        return _extended(values.index_select(0, self.vertices), self.blends, self.weights)
+
+
+def build_scene(vertices: Tensor, topology: Topology, camera: Camera, size: Size) -> Scene:
+    """The scene of ``vertices`` (meshes, V, 3)."""
+    meshes, count, _ = vertices.shape
+    views, device = camera.num_views, vertices.device
+    local = camera.local(vertices).reshape(-1, 3)
+    pictures = torch.arange(meshes * views, device=device)
+    vertex = torch.arange(meshes * count, device=device).view(meshes, 1, count).expand(-1, views, -1).reshape(-1)
+    view = torch.arange(views, device=device).view(1, views, 1).expand(meshes, -1, count).reshape(-1)
+
+    cut = triangulate(vertices, topology)
+    first = (pictures * count)[:, None, None]
+    triangles = cut.triangles.repeat_interleave(views, 0) + first
+    folds, fold_faces, fold_pictures = _folds(local.detach(), triangles, cut.faces, camera)
+    sides, side_faces = topology.edges, _edge_faces(topology)
+    edges = torch.cat([(sides + first).view(-1, 2), folds])
+    edge_faces = torch.cat([side_faces.repeat(meshes * views, 1), fold_faces])
+    edge_pictures = torch.cat([pictures.repeat_interleave(sides.shape[0]), fold_pictures])
+    faces, triangle_pictures = cut.faces.repeat(meshes * views), pictures.repeat_interleave(cut.faces.shape[0])
+    triangles = triangles.view(-1, 3)
+
+    blends, weights = vertex.new_zeros(0, 2), local.new_zeros(0)
+    near = camera.near
+    if near is not None:
+        distance = local.detach()[:, 2] - near.to(local)[view]
+        if not bool((distance > 0).all()):
+            left = clip_triangles(triangles, distance, local.shape[0])
+            kept = clip_edges(edges, distance, local.shape[0] + left.blends.shape[0])
+            triangles, faces, triangle_pictures = left.items, faces[left.source], triangle_pictures[left.source]
+            edges, edge_faces, edge_pictures = kept.items, edge_faces[kept.source], edge_pictures[kept.source]
+            blends, weights = torch.cat([left.blends, kept.blends]), torch.cat([left.weights, kept.weights])
+            local, view = _extended(local, blends, weights), torch.cat([view, view[blends[:, 0]]])
+    points = camera.to_screen(local, size, view)
+    return Scene(
+        meshes, views, points, vertex, blends, weights,
+        triangles, faces, triangle_pictures, edges, edge_faces, edge_pictures,
+    )  # fmt: skip
+
+
+def _extended(values: Tensor, blends: Tensor, weights: Tensor) -> Tensor:
+    """``values`` (N, d) followed by those between two of them."""
+    if blends.shape[0] == 0:
+        return values
+    first, second = values.index_select(0, blends[:, 0]), values.index_select(0, blends[:, 1])
+    return torch.cat([values, torch.lerp(first, second, weights.to(values)[:, None])])
+
+
+def _edge_faces(topology: Topology) -> Tensor:
+    """(E, 2) faces beside each edge; on the boundary the only one twice."""
+    face = torch.zeros_like(topology.edges[:, 0])
+    face[topology.corner_edges] = topology.corner_faces
+    boundary = face[topology.num_interior_edges :, None].expand(-1, 2)
+    return torch.cat([topology.interior_edge_faces, boundary])
+
+
+def _folds(local: Tensor, triangles: Tensor, faces: Tensor, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:
+    """Cuts between two triangles of one polygon that show different sides: points, the face twice, picture."""
+    inner = torch.nonzero(faces[1:] == faces[:-1]).squeeze(1)
+    if inner.shape[0] == 0:
+        return triangles.new_zeros(0, 2), triangles.new_zeros(0, 2), triangles.new_zeros(0)
+    a, b, c = local[triangles].unbind(-2)
+    area = cross(b - a, c - a)
+    facing = area[..., 2] if camera.near is None else dot(a, area)
+    picture, number = torch.nonzero(facing[:, inner] * facing[:, inner + 1] < 0).unbind(1)
+    second = inner[number] + 1
+    return triangles[picture, second, :2], faces[second, None].expand(-1, 2), picture
