@@ -4,9 +4,13 @@ In a principal-symmetric mesh (paper section 2.3) one third of the edges follows
 others lie symmetrically to them. :class:`PrincipalEdges` says which third that is.
 """
 
+from .developable_strips import DevelopableStrips as DevelopableStrips
 from .directions import AlignedEdges as AlignedEdges
 from .directions import principal_edges_from_directions as principal_edges_from_directions
 from .labels import principal_edges_from_seed as principal_edges_from_seed
 from .labels import principal_edges_of_lattice as principal_edges_of_lattice
 from .principal_edges import PrincipalEdges as PrincipalEdges
 from .principal_edges import PrincipalStars as PrincipalStars
+from .strip_limits import StripLimits as StripLimits
+from .strip_limits import strip_limits as strip_limits
+from .strips import developable_strips as developable_strips
