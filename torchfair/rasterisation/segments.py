@@ -27,7 +27,7 @@ class Segments(NamedTuple):
 
 
 def pixel_segments(ends: Tensor, pictures: Tensor, width: int, height: int) -> Segments:
-    """Cuts edges with ``ends`` (E, 2, 2), float64 and finite, at the borders of pixels, and drops what is off the screen.
+    """Cuts edges with ``ends`` (E, 2, 2), float64 and finite, at the borders of pixels; drops what is off the screen.
 
     Args:
         ends: pixel coordinates of both ends of every edge.

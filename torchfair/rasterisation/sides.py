@@ -22,11 +22,23 @@ _FAR = torch.iinfo(torch.int64).max
 
 
 class Places(NamedTuple):
-    """Middles of segments ``(S, 2)``, steps ``(S, 2)`` to the side, and their pixels ``(S,)`` in ascending order."""
+    """Middles of segments ``(2, S)``, steps ``(2, S)`` to the second side, and their pixels ``(S,)`` in order."""
 
     middle: Tensor
     step: Tensor
     pixel: Tensor
+
+
+class Tables(NamedTuple):
+    """Triangles as functions of the place: three that are at least zero inside, and the depth level.
+
+    Attributes:
+        planes: (12, T), coefficients of x of the four functions, then of y, then constants.
+        bounds: (2, T), least and largest level.
+    """
+
+    planes: Tensor
+    bounds: Tensor
 
 
 def seen_beside(
@@ -34,7 +46,7 @@ def seen_beside(
 ) -> Tensor:
     """The nearest triangle on both sides of the middle of each segment: (S, 2), -1 where there is none.
 
-    The first side is where ``(dy, -dx)`` points away from, (dx, dy) being the direction of the edge. Places are
+    The second side is the one that ``(dy, -dx)`` points to, (dx, dy) being the direction of the edge. Places are
     :data:`STEP` pixels off the edge and tested against every triangle that touches the pixel, so triangles smaller
     than a pixel are found too. Equal depths go to the triangle with the smaller number.
 
@@ -46,30 +58,24 @@ def seen_beside(
         shape: number of pictures, height, width.
     """
     places = _places(segments, ends)
-    nearest = torch.full((places.pixel.shape[0], 2), _FAR, device=corners.device)
+    nearest = torch.full((2, places.pixel.shape[0]), _FAR, device=corners.device)
     spans = touched_spans(corners[..., :2], shape[2], shape[1])
-    table = _tables(corners, pictures, shape[0], spans)
+    tables = _tables(corners, pictures, shape[0], spans)
     for span, place in _meetings(spans, pictures, places.pixel, shape):
-        triangle = spans.triangle.index_select(0, span)
-        key = _keys(table.index_select(0, triangle), places, place, triangle)
-        nearest.scatter_reduce_(0, place[:, None].expand(-1, 2), key, "amin")
-    return unpack_nearest(nearest)
+        keys = _keys(tables, spans.triangle.index_select(0, span), places, place)
+        nearest.scatter_reduce_(1, place.expand(2, -1), keys, "amin")
+    return unpack_nearest(nearest).T
 
 
 def _places(segments: Segments, ends: Tensor) -> Places:
     origin, along = ends[:, 0], ends[:, 1] - ends[:, 0]
     length = torch.linalg.vector_norm(along, dim=-1, keepdim=True)
     across = torch.stack([along[:, 1], -along[:, 0]], dim=-1) * (STEP / torch.where(length > 0, length, 1))
-    position = ((segments.begin + segments.end) / 2)[:, None]
-    middle = origin.index_select(0, segments.edge) + position * along.index_select(0, segments.edge)
-    return Places(middle, across.index_select(0, segments.edge), segments.pixel)
+    origin, along, across = (part.T.contiguous().index_select(1, segments.edge) for part in (origin, along, across))
+    return Places(origin + along * ((segments.begin + segments.end) / 2), across, segments.pixel)
 
 
-def _tables(corners: Tensor, pictures: Tensor, num_pictures: int, spans: TouchedSpans) -> Tensor:
-    """One row of 14 for each triangle: three edge functions and the depth level as (x, y, 1), least and largest level.
-
-    A place lies in the triangle where all three edge functions are at least zero.
-    """
+def _tables(corners: Tensor, pictures: Tensor, num_pictures: int, spans: TouchedSpans) -> Tables:
     x, y, z = corners.unbind(-1)
     touching = spans.triangle
     lower, upper = z.amin(1), z.amax(1)
@@ -79,15 +85,14 @@ def _tables(corners: Tensor, pictures: Tensor, num_pictures: int, spans: Touched
     dx, dy = x.roll(-1, 1) - x, y.roll(-1, 1) - y
     doubled_area = dx[:, 0] * dy[:, 1] - dy[:, 0] * dx[:, 1]
     solid = doubled_area != 0
-    inverse = torch.where(solid, 1 / torch.where(solid, doubled_area, 1), 0)
+    inverse = torch.where(solid, 1 / torch.where(solid, doubled_area, 1), 0)[:, None]
     # The function of the edge from corner i is the barycentric weight of corner i - 1; without area it is -1.
-    a, b = -dy * inverse[:, None], dx * inverse[:, None]
-    c = torch.where(solid[:, None], -(a * x + b * y), -1)
+    a, b = -dy * inverse, dx * inverse
+    weights = a, b, torch.where(solid[:, None], -(a * x + b * y), -1)
     opposite = level.roll(1, 1)
-    planes = torch.stack([a, b, c], dim=-1)
-    depth = (planes * opposite[..., None]).sum(1)
-    bounds = torch.stack([level.amin(1), level.amax(1)], dim=-1)
-    return torch.cat([planes.flatten(1), depth, bounds], dim=1)
+    planes = torch.cat([torch.cat([w, (w * opposite).sum(1, keepdim=True)], dim=1) for w in weights], dim=1)
+    bounds = torch.stack([level.amin(1), level.amax(1)])
+    return Tables(planes.T.contiguous(), bounds)
 
 
 def _meetings(
@@ -113,19 +118,14 @@ def _meetings(
             yield chosen[low:high].index_select(0, item), begin[low:high].index_select(0, item) + offset
 
 
-def _keys(table: Tensor, places: Places, place: Tensor, triangle: Tensor) -> Tensor:
-    """Depth level and number (n, 2) of triangles on both sides of places, or the largest key where they miss it."""
-    x, y = places.middle.index_select(0, place).unbind(-1)
-    step_x, step_y = places.step.index_select(0, place).unbind(-1)
-    columns = table.unbind(-1)
-    values, slopes = [], []
-    for a, b, c in (columns[0:3], columns[3:6], columns[6:9], columns[9:12]):
-        values.append(a * x + b * y + c)
-        slopes.append(a * step_x + b * step_y)
-    sides = []
-    for sign in (-1, 1):
-        first, second, third, level = (value + sign * slope for value, slope in zip(values, slopes, strict=True))
-        inside = torch.minimum(torch.minimum(first, second), third) >= 0
-        level = torch.minimum(torch.maximum(level, columns[12]), columns[13])
-        sides.append(torch.where(inside, (level.to(torch.int64) << 32) | triangle, _FAR))
-    return torch.stack(sides, dim=-1)
+def _keys(tables: Tables, triangle: Tensor, places: Places, place: Tensor) -> Tensor:
+    """Depth level and number (2, n) of triangles on both sides of places, the largest key where they miss it."""
+    a, b, c = tables.planes.index_select(1, triangle).view(3, 4, -1).unbind(0)
+    x, y = places.middle.index_select(1, place)
+    step_x, step_y = places.step.index_select(1, place)
+    slopes = torch.addcmul(a * step_x, b, step_y)
+    values = c.addcmul_(a, x).addcmul_(b, y)
+    sides = torch.stack([values - slopes, values + slopes])
+    inside = torch.minimum(torch.minimum(sides[:, 0], sides[:, 1]), sides[:, 2]) >= 0
+    level = torch.clamp(sides[:, 3], *tables.bounds.index_select(1, triangle))
+    return torch.where(inside, (level.to(torch.int64) << 32) | triangle, _FAR)

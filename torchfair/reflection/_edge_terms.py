@@ -40,11 +40,13 @@ def edge_terms(
     own = _own(scene, segments, sides, smooth)
     segments, sides = Segments(*(part.index_select(0, own) for part in segments)), sides.index_select(0, own)
 
-    position = ((segments.begin + segments.end) / 2)[:, None]
     start, along = ends[segments.edge, 0], (ends[:, 1] - ends[:, 0])[segments.edge]
-    places = start + position * along
+    position = ((segments.begin + segments.end) / 2)[:, None]
+    centre = _centres(segments.pixel, width, height).to(start)
+    # Colours of flat faces are those at the centre of the square, as for its sample: then no area changes colour.
+    places = start + position * along if smooth else centre
     jump = shade(sides[:, 1], places) - shade(sides[:, 0], places)
-    shadow = _shadows(segments, start, along, width, height).to(jump)[:, None]
+    shadow = _shadows(segments, start - centre, along).to(jump)[:, None]
     corrections = shadow * jump if antialias else shadow * (jump - jump.detach())
 
     across = torch.stack([along[:, 1], -along[:, 0]], dim=-1) * (segments.end - segments.begin)[:, None]
@@ -52,6 +54,11 @@ def edge_terms(
     moved = torch.lerp(tail, head, position.to(tail))
     motion = (across.to(moved) * (moved - moved.detach())).sum(-1, keepdim=True)
     return segments.pixel, corrections - motion * jump.detach()
+
+
+def _centres(pixel: Tensor, width: int, height: int) -> Tensor:
+    column, row = torch.remainder(pixel, width), torch.div(pixel, width, rounding_mode="floor")
+    return torch.stack([column, torch.remainder(row, height)], dim=-1) + 0.5
 
 
 def _own(scene: Scene, segments: Segments, sides: Tensor, smooth: bool) -> Tensor:
@@ -64,13 +71,16 @@ def _own(scene: Scene, segments: Segments, sides: Tensor, smooth: bool) -> Tenso
     return torch.nonzero(parting).squeeze(1)
 
 
-def _shadows(segments: Segments, start: Tensor, along: Tensor, width: int, height: int) -> Tensor:
-    """Area of each pixel behind its segment as seen from its centre; negative if the first side is the outer one."""
-    column = torch.remainder(segments.pixel, width)
-    row = torch.remainder(torch.div(segments.pixel, width, rounding_mode="floor"), height)
-    centre = torch.stack([column, row], dim=-1) + 0.5 + start.new_tensor(_APEX)
-    first = start - centre + segments.begin[:, None] * along
-    second = start - centre + segments.end[:, None] * along
+def _shadows(segments: Segments, start: Tensor, along: Tensor) -> Tensor:
+    """Area of each pixel behind its segment as seen from its centre; negative if the first side is the outer one.
+
+    Args:
+        segments: pieces of edges.
+        start: (S, 2) from the centre to where the edge starts.
+        along: (S, 2) from there to its other end.
+    """
+    start = start - start.new_tensor(_APEX)
+    first, second = (start + position[:, None] * along for position in (segments.begin, segments.end))
     doubled = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     turn = _round_the_square(second) - _round_the_square(first)
     turn = turn - 4 * torch.round(turn / 4)

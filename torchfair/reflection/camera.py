@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import torch
 from torch import Tensor
 
 from ..errors import ShapeError, TorchfairError
+
+if TYPE_CHECKING:
+    from typing import Self
 
 Size: TypeAlias = int | tuple[int, int]
 """Pixels of a picture: one number for a square, or (height, width)."""
@@ -70,6 +73,10 @@ class Camera(ABC):
 
         The zero vector at the eye itself.
         """
+
+    def select(self, views: slice | Tensor) -> Self:
+        """The same camera with some of its views."""
+        return type(self)(**{field.name: getattr(self, field.name)[views] for field in fields(self)})
 
     def local(self, vertices: Tensor) -> Tensor:
         """Positions (*batch, views, V, 3) of vertices (*batch, V, 3) along :attr:`axes`, from :attr:`origins`."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import functools
+import math
 from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor
 
+from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals, vertex_normals
-from ..rasterisation.rasterise import visible_triangles
+from ..rasterisation import visible_triangles
 from ..topology import Topology
 from ._edge_terms import edge_terms
+from ._samples import coarse_pixels, mean_colors
 from ._scene import build_scene
 from ._shading import ConstantShader, PlaceShader, Shader, Surroundings
 from .camera import Camera, Size, height_and_width
@@ -19,7 +21,7 @@ from .environments import Environment
 
 Shading = Literal["flat", "smooth"]
 
-_BAND = 1 << 16  # samples coloured at a time on a CPU: keeps every temporary inside the cache
+_MOST = 1 << 23  # samples worked on at a time
 
 
 class Reflection(NamedTuple):
@@ -49,63 +51,119 @@ def render_reflection(
     normals: Tensor | None = None,
     background: Tensor | float = 0.0,
 ) -> Reflection:
-    """The environment as the mesh mirrors it, one picture for every view."""
+    """The environment as the mesh mirrors it, one picture for every mesh of the batch in every view.
+
+    Each place shows the environment in the mirrored line of sight ``r = d - 2 (d.n) n``, one reflection deep. Both
+    sides of a face mirror. A polygon mirrors as one plane, perpendicular to its area vector (see
+    :func:`torchfair.geometry.face_area_vectors`), and shows no seam where it is cut into triangles. The nearest face
+    hides the others; of faces at the same depth the one with the smaller number is seen, on every device. Faces
+    without area on the screen are not seen. Where nothing is seen, the image is ``background`` and the coverage 0.
+
+    **Pixels.** Samples are taken at the centres of ``supersampling``^2 squares in each pixel and averaged.
+    With ``antialias`` each of these squares shows the mean over the faces in it instead, weighted by the exact areas
+    that they cover (but for faces that penetrate each other, and for the square in which an edge passes behind
+    another face); for a face its colour at the centre of the square counts.
+
+    **Gradients** with respect to vertices, normals and parameters of the environment are those of the image with
+    ``antialias``, whether it is asked for or not: exact derivatives of areas and colours, which follow the motion of
+    every edge, inside the mesh, on its outline and where one part hides another. So the gradient without
+    ``antialias`` is not that of the sampled image, which jumps as edges pass samples, but of the one it samples. It is
+    finite everywhere. Lines along which faces penetrate each other move without contributing, and edges that two
+    separate parts have in common, without being one edge of the topology, contribute twice.
+
+    Args:
+        vertices: positions (*batch, V, 3), finite.
+        topology: connectivity; any polygons that are star-shaped from one of their corners, mixed.
+        camera: the views. What lies nearer to a perspective eye than 1e-4 of the distance of its target, or behind
+            it, is cut away.
+        environment: takes unit directions (..., 3), returns values (..., channels).
+        size: pixels of a picture, (height, width) or one number for a square.
+        supersampling: squares along each side of a pixel, at least 1.
+        antialias: whether squares show the exact mean of the faces in them.
+        shading: ``"flat"``, one normal per face, or ``"smooth"``, vertex normals blended over each face (straight in
+            space), as for a smooth reference surface.
+        normals: unit normals to use instead of those of the mesh: (*batch, F, 3) for flat and (*batch, V, 3) for
+            smooth shading. The zero vector lets the line of sight pass straight through.
+        background: a number or (channels,).
+
+    Raises:
+        ShapeError: if a tensor has the wrong shape, or the size is below one pixel.
+        TorchfairError: if a vertex is not finite, or for an unknown shading or a supersampling below 1.
+    """
+    topology.check_vertices(vertices)
     height, width = height_and_width(size)
-    fine = (height * supersampling, width * supersampling)
-    meshes = vertices.reshape(-1, topology.num_vertices, 3)
-    smooth = shading == "smooth"
+    if shading not in ("flat", "smooth"):
+        raise TorchfairError(f'shading must be "flat" or "smooth", got {shading!r}')
+    if supersampling < 1:
+        raise TorchfairError(f"supersampling must be at least 1, got {supersampling}")
+    if not bool(torch.isfinite(vertices).all()):
+        raise TorchfairError("a vertex is not finite: pictures need positions without NaN and infinity")
     if normals is None:
-        normals = vertex_normals(meshes, topology) if smooth else face_normals(meshes, topology)
-    scene = build_scene(meshes, topology, camera, fine)
-    around = Surroundings(camera, fine, environment, background)
-    shade: Shader = (
-        PlaceShader(scene, normals, around, smooth=smooth)
-        if smooth or camera.near is not None
-        else ConstantShader(scene, normals, around)
+        normals = (vertex_normals if shading == "smooth" else face_normals)(vertices, topology)
+    else:
+        _check_normals(normals, vertices, topology, shading)
+    batch = vertices.shape[:-2]
+    meshes, normals = (part.reshape(math.prod(batch), *part.shape[-2:]) for part in (vertices, normals))
+    fine = (height * supersampling, width * supersampling)
+    mesh_step, view_step = _steps(meshes.shape[0], camera.num_views, fine)
+    rows = []
+    for mesh in range(0, max(meshes.shape[0], 1), mesh_step):
+        row = [
+            _render(
+                meshes[mesh : mesh + mesh_step],
+                topology,
+                normals[mesh : mesh + mesh_step],
+                Surroundings(camera.select(slice(view, view + view_step)), fine, environment, background),
+                supersampling,
+                smooth=shading == "smooth",
+                antialias=antialias,
+            )
+            for view in range(0, camera.num_views, view_step)
+        ]
+        rows.append([torch.cat(parts, dim=1) for parts in zip(*row, strict=True)])
+    colors, faces = (torch.cat(parts) for parts in zip(*rows, strict=True))
+    colors = colors.view(*batch, camera.num_views, height, width, -1).movedim(-1, -3)
+    image, coverage = colors[..., :-1, :, :].contiguous(), colors[..., -1, :, :].contiguous()
+    return Reflection(image, coverage, faces.view(*batch, camera.num_views, *fine))
+
+
+def _render(
+    meshes: Tensor,
+    topology: Topology,
+    normals: Tensor,
+    around: Surroundings,
+    supersampling: int,
+    *,
+    smooth: bool,
+    antialias: bool,
+) -> tuple[Tensor, Tensor]:
+    """Colours and coverage (meshes, views, H W, channels + 1), and face numbers of the samples."""
+    camera, (height, width) = around.camera, height_and_width(around.size)
+    scene = build_scene(meshes, topology, camera, around.size)
+    shade: Shader = ConstantShader(scene, normals, around)
+    if smooth or camera.near is not None:
+        shade = PlaceShader(scene, normals, around, smooth=smooth)
+    seen = visible_triangles(
+        scene.points, scene.triangles, width, height, pictures=scene.pictures, num_pictures=scene.num_pictures
     )
-    triangle = visible_triangles(
-        scene.points, scene.triangles, fine[1], fine[0], pictures=scene.pictures, num_pictures=scene.num_pictures
-    )
-    image = _sampled(shade, triangle, supersampling)
-    if antialias or (torch.is_grad_enabled() and (image.requires_grad or scene.points.requires_grad)):
-        pixel, terms = edge_terms(scene, shade, fine, smooth=smooth, antialias=antialias)
-        image = image.index_add(0, _coarse(pixel, fine, supersampling), terms / supersampling**2)
-    faces = torch.cat([scene.faces, scene.faces.new_tensor([-1])])[triangle]
-    lead = (*vertices.shape[:-2], camera.num_views)
-    image = image.view(*lead, height, width, -1).movedim(-1, -3)
-    return Reflection(image[..., :-1, :, :].contiguous(), image[..., -1, :, :].contiguous(), faces.view(*lead, *fine))
+    colors = mean_colors(shade, seen, supersampling)
+    if antialias or (torch.is_grad_enabled() and (colors.requires_grad or scene.points.requires_grad)):
+        pixels, terms = edge_terms(scene, shade, (height, width), smooth=smooth, antialias=antialias)
+        pixels = coarse_pixels(pixels, width, supersampling)
+        colors = colors.index_add(0, pixels, terms / supersampling**2)
+    faces = torch.cat([scene.faces, scene.faces.new_tensor([-1])])[seen]  # -1 picks the last
+    lead = (scene.num_meshes, scene.num_views)
+    return colors.view(*lead, -1, colors.shape[-1]), faces.view(*lead, height, width)
 
 
-def _sampled(shade: Shader, triangle: Tensor, factor: int) -> Tensor:
-    """Mean colours (pictures H W, channels + 1) of the samples at the centres of the pixels of ``triangle``."""
-    pictures, height, width = triangle.shape
-    rows = triangle.view(-1, factor * width)  # those of one row of pixels
-    step = max(1, _BAND // rows.shape[1]) if triangle.device.type == "cpu" else rows.shape[0]
-    bands = []
-    for first in range(0, rows.shape[0], step):
-        band = rows[first : first + step]
-        places = _centres(first * factor, band.shape[0] * factor, width, height, band) if shade.uses_places else band
-        colors = shade(band.reshape(-1), places)
-        cells = colors.view(band.shape[0], factor, width // factor, factor, colors.shape[1])
-        parts = [cells[:, row, :, column] for row in range(factor) for column in range(factor)]
-        bands.append((functools.reduce(torch.add, parts) / factor**2).view(-1, colors.shape[1]))
-    return torch.cat(bands)
+def _steps(meshes: int, views: int, size: tuple[int, int]) -> tuple[int, int]:
+    """How many meshes and views to work on at a time."""
+    most = max(1, _MOST // (size[0] * size[1]))
+    return (max(1, most // views), views) if most >= views else (1, most)
 
 
-def _centres(first: int, count: int, width: int, height: int, like: Tensor) -> Tensor:
-    """Pixel centres (count * width, 2) of some rows of a stack of pictures, float64."""
-    x = torch.arange(width, dtype=torch.float64, device=like.device) + 0.5
-    y = torch.remainder(torch.arange(first, first + count, dtype=torch.float64, device=like.device), height) + 0.5
-    return torch.stack([x.expand(count, -1), y[:, None].expand(-1, width)], dim=-1).view(-1, 2)
-
-
-def _coarse(pixel: Tensor, fine: tuple[int, int], factor: int) -> Tensor:
-    """Numbers of the pixels that samples are part of."""
-    if factor == 1:
-        return pixel
-    height, width = fine
-    column = torch.remainder(pixel, width)
-    row = torch.div(pixel, width, rounding_mode="floor")  # through the stack of pictures
-    return torch.div(row, factor, rounding_mode="floor") * (width // factor) + torch.div(
-        column, factor, rounding_mode="floor"
-    )
+def _check_normals(normals: Tensor, vertices: Tensor, topology: Topology, shading: Shading) -> None:
+    count = topology.num_vertices if shading == "smooth" else topology.num_faces
+    expected = (*vertices.shape[:-2], count, 3)
+    if tuple(normals.shape) != expected or not normals.is_floating_point():
+        raise ShapeError(f"normals for {shading} shading", f"a floating tensor {expected}", tuple(normals.shape))
