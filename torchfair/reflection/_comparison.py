@@ -31,16 +31,16 @@ def dissimilarity(image: Tensor, reference: Tensor, window: Tensor) -> Tensor:
 
     Args:
         image: (*batch, channels, H, W) in 0..1.
-        reference: likewise.
+        reference: of the same shape, or one that broadcasts to it.
         window: (*batch, H, W) bool.
     """
     from kornia.metrics import ssim
 
-    image, reference = torch.broadcast_tensors(image, reference)  # type: ignore[no-untyped-call]
-    shape = image.shape[-3:]
+    shape = image.shape
     if min(shape[-2:]) <= WINDOW:  # too small for kornia to pad, and for a window
-        return image.new_zeros(image.shape[:-2])
-    similarity = ssim(image.reshape(-1, *shape), reference.reshape(-1, *shape), WINDOW).view(image.shape)
+        return image.new_zeros(shape[:-2])
+    pair = (picture.expand(shape).reshape(-1, *shape[-3:]) for picture in (image, reference))
+    similarity = ssim(*pair, WINDOW, eps=0.0).view(shape)
     return masked_mean(1 - similarity, window[..., None, :, :])
 
 

@@ -137,7 +137,9 @@ class ReflectionSetup:
 
     def pictures_to_match(self, vertices: Tensor, topology: Topology) -> Pictures:
         """What a mesh is compared with: the reference, or the mesh itself shaded by its vertex normals."""
-        return self.smooth(vertices, topology) if self.reference is None else self.reference_pictures
+        if self.reference is None:
+            return self.smooth(vertices, topology)
+        return Pictures(*(picture.to(vertices) for picture in self.reference_pictures))
 
     def _surroundings(self, directions: Tensor) -> Tensor:
         return torch.cat([self.stripes(directions), directions], dim=-1)
