@@ -86,7 +86,10 @@ def build_scene(vertices: Tensor, topology: Topology, camera: Camera, size: Size
             triangles, faces, triangle_pictures = left.items, faces[left.source], triangle_pictures[left.source]
             edges, edge_faces, edge_pictures = kept.items, edge_faces[kept.source], edge_pictures[kept.source]
             blends, weights = torch.cat([left.blends, kept.blends]), torch.cat([left.weights, kept.weights])
-            local, view = _extended(local, blends, weights), torch.cat([view, view[blends[:, 0]]])
+            # Points that were cut away are no longer used; a place in front of the eye keeps their derivatives finite.
+            behind = torch.cat([distance <= 0, torch.zeros_like(weights, dtype=torch.bool)])[:, None]
+            local = torch.where(behind, local.new_tensor([0.0, 0, 1]), _extended(local, blends, weights))
+            view = torch.cat([view, view[blends[:, 0]]])
     points = camera.to_screen(local, size, view)
     return Scene(
         meshes, views, points, vertex, blends, weights,
