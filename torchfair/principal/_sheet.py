@@ -34,33 +34,47 @@ class Layout(NamedTuple):
 
     Attributes:
         corners: (S, 2) where to move the lower left corner of each bounding box.
-        size: width and height of the sheet.
+        width: of the sheet.
+        height: of the sheet.
     """
 
     corners: Floats
-    size: tuple[float, float]
+    width: float
+    height: float
 
 
 def shelves(boxes: Floats, gap: float, width: float | None) -> Layout:
     """Places boxes (S, 2) in rows, high ones first, each ``gap`` away from its neighbours and the rim.
 
+    Without a width, the smallest of several sheets is taken that are not much longer than broad.
+
     Raises:
         TorchfairError: if a box is broader than the sheet.
     """
     if not len(boxes):
-        return Layout(boxes, (0.0, 0.0))
+        return Layout(boxes, 0.0, 0.0)
     broadest = float(boxes[:, 0].max()) + 2 * gap
-    if width is None:
-        width = max(broadest, math.sqrt(1.2 * float((boxes + gap).prod(1).sum())))
-    if width < broadest * (1 - 1e-9):
-        raise TorchfairError(f"sheet_width: a strip needs {broadest:.6g} with gaps, the sheet has {width:.6g}")
+    if width is not None:
+        if width < broadest * (1 - 1e-9):
+            raise TorchfairError(f"sheet_width: a strip needs {broadest:.6g} with gaps, the sheet has {width:.6g}")
+        return _first_fit(boxes, gap, width)._replace(width=width)
+    square = math.sqrt(float((boxes + gap).prod(1).sum()))
+    tried = [_first_fit(boxes, gap, max(broadest, square * step / 8)) for step in range(8, 17)]
+    return min(tried, key=lambda layout: layout.width * layout.height)
+
+
+def _first_fit(boxes: Floats, gap: float, width: float) -> Layout:
+    """Every box goes to the first row that has room for it; the sheet is as wide as the fullest row."""
     corners = np.zeros_like(boxes)
-    x = y = gap
-    row = 0.0
-    for box in np.lexsort((np.arange(len(boxes)), -boxes[:, 0], -boxes[:, 1])).tolist():
+    rows: list[list[float]] = []  # where the next box goes in each row: x, y
+    top = gap
+    for box in np.lexsort((-boxes[:, 0], -boxes[:, 1])).tolist():
         across, up = boxes[box].tolist()
-        if x > gap and x + across + gap > width * (1 + 1e-9):
-            x, y, row = gap, y + row + gap, 0.0
-        corners[box] = x, y
-        x, row = x + across + gap, max(row, up)
-    return Layout(corners, (width, y + row + gap))
+        row = next((row for row in rows if row[0] + across + gap <= width * (1 + 1e-9)), None)
+        if row is None:
+            row = [gap, top]
+            rows.append(row)
+            top += up + gap
+        corners[box] = row
+        row[0] += across + gap
+    return Layout(corners, max(row[0] for row in rows), top)

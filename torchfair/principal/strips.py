@@ -47,7 +47,7 @@ def developable_strips(
         height: from the mesh to the side of the normals, in the unit of the vertices.
         depth: from the mesh to the other side.
         gap: distance between strips on the sheet and to its rim; a quarter of the width of the strips by default.
-        sheet_width: width of the sheet; by default the sheet is about square, or as wide as the longest strip.
+        sheet_width: width of the sheet; by default the best of several, from about square to twice as broad as that.
 
     Raises:
         ShapeError: for tensors of another shape.
@@ -78,7 +78,7 @@ def developable_strips(
         vertices=torch.from_numpy(np.concatenate([np.zeros((0, 2, 3)), *(part for _, part in cut)]).reshape(-1, 3)),
         topology=Topology.from_faces(_quads(offsets), num_vertices=2 * count),
         uv=torch.from_numpy(np.concatenate([np.zeros((0, 2, 2)), *placed]).reshape(-1, 2)),
-        sheet=layout.size,
+        sheet=(layout.width, layout.height),
         mesh_vertices=torch.from_numpy(np.concatenate([np.zeros(0, np.int64), *(line for line, _ in cut)])),
         offsets=torch.from_numpy(offsets),
         polylines=torch.tensor(owners, dtype=torch.int64),
