@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor
+from torch.autograd.forward_ad import unpack_dual
 
 from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals, vertex_normals
@@ -68,8 +70,9 @@ def render_reflection(
     ``antialias``, whether it is asked for or not: exact derivatives of areas and colours, which follow the motion of
     every edge, inside the mesh, on its outline and where one part hides another. So the gradient without
     ``antialias`` is not that of the sampled image, which jumps as edges pass samples, but of the one it samples. It is
-    finite everywhere. Lines along which faces penetrate each other move without contributing, and edges that two
-    separate parts have in common, without being one edge of the topology, contribute twice.
+    finite everywhere, in reverse and forward mode. Lines along which faces penetrate each other move without contributing, and edges that two
+    separate parts have in common, without being one edge of the topology, contribute twice. In functions compiled by
+    ``torch.compile`` pictures are left to eager mode (a graph break).
 
     Args:
         vertices: positions (*batch, V, 3), finite.
@@ -96,35 +99,40 @@ def render_reflection(
         raise TorchfairError(f'shading must be "flat" or "smooth", got {shading!r}')
     if supersampling < 1:
         raise TorchfairError(f"supersampling must be at least 1, got {supersampling}")
-    if not bool(torch.isfinite(vertices).all()):
-        raise TorchfairError("a vertex is not finite: pictures need positions without NaN and infinity")
     if normals is None:
         normals = (vertex_normals if shading == "smooth" else face_normals)(vertices, topology)
     else:
         _check_normals(normals, vertices, topology, shading)
-    batch = vertices.shape[:-2]
+    around = Surroundings(camera, (height * supersampling, width * supersampling), environment, background)
+    draw = _pictures
+    if torch.compiler.is_compiling():  # left to eager mode: sizes depend on what is seen
+        draw = torch.compiler.disable(_pictures)  # type: ignore[no-untyped-call]
+    colors, faces = draw(
+        vertices, topology, normals, around, supersampling, smooth=shading == "smooth", antialias=antialias
+    )
+    colors = colors.view(*colors.shape[:-2], height, width, -1).movedim(-1, -3)
+    return Reflection(colors[..., :-1, :, :].contiguous(), colors[..., -1, :, :].contiguous(), faces)
+
+
+def _pictures(
+    vertices: Tensor, topology: Topology, normals: Tensor, around: Surroundings, factor: int, **how: bool
+) -> tuple[Tensor, Tensor]:
+    """All pictures, some at a time: (*batch, views, H W, channels + 1), and face numbers of the samples."""
+    if not bool(torch.isfinite(vertices).all()):
+        raise TorchfairError("a vertex is not finite: pictures need positions without NaN and infinity")
+    batch, views = vertices.shape[:-2], around.camera.num_views
     meshes, normals = (part.reshape(math.prod(batch), *part.shape[-2:]) for part in (vertices, normals))
-    fine = (height * supersampling, width * supersampling)
-    mesh_step, view_step = _steps(meshes.shape[0], camera.num_views, fine)
+    mesh_step, view_step = _steps(meshes.shape[0], views, height_and_width(around.size))
     rows = []
-    for mesh in range(0, max(meshes.shape[0], 1), mesh_step):
-        row = [
-            _render(
-                meshes[mesh : mesh + mesh_step],
-                topology,
-                normals[mesh : mesh + mesh_step],
-                Surroundings(camera.select(slice(view, view + view_step)), fine, environment, background),
-                supersampling,
-                smooth=shading == "smooth",
-                antialias=antialias,
-            )
-            for view in range(0, camera.num_views, view_step)
-        ]
+    for first in range(0, max(meshes.shape[0], 1), mesh_step):
+        chosen = slice(first, first + mesh_step)
+        row = []
+        for view in range(0, views, view_step):
+            some = dataclasses.replace(around, camera=around.camera.select(slice(view, view + view_step)))
+            row.append(_render(meshes[chosen], topology, normals[chosen], some, factor, **how))
         rows.append([torch.cat(parts, dim=1) for parts in zip(*row, strict=True)])
     colors, faces = (torch.cat(parts) for parts in zip(*rows, strict=True))
-    colors = colors.view(*batch, camera.num_views, height, width, -1).movedim(-1, -3)
-    image, coverage = colors[..., :-1, :, :].contiguous(), colors[..., -1, :, :].contiguous()
-    return Reflection(image, coverage, faces.view(*batch, camera.num_views, *fine))
+    return colors.view(*batch, *colors.shape[1:]), faces.view(*batch, *faces.shape[1:])
 
 
 def _render(
@@ -132,7 +140,7 @@ def _render(
     topology: Topology,
     normals: Tensor,
     around: Surroundings,
-    supersampling: int,
+    factor: int,
     *,
     smooth: bool,
     antialias: bool,
@@ -146,14 +154,21 @@ def _render(
     seen = visible_triangles(
         scene.points, scene.triangles, width, height, pictures=scene.pictures, num_pictures=scene.num_pictures
     )
-    colors = mean_colors(shade, seen, supersampling)
-    if antialias or (torch.is_grad_enabled() and (colors.requires_grad or scene.points.requires_grad)):
+    colors = mean_colors(shade, seen, factor)
+    if antialias or _differentiated(colors, scene.points):
         pixels, terms = edge_terms(scene, shade, (height, width), smooth=smooth, antialias=antialias)
-        pixels = coarse_pixels(pixels, width, supersampling)
-        colors = colors.index_add(0, pixels, terms / supersampling**2)
+        pixels = coarse_pixels(pixels, width, factor)
+        colors = colors.index_add(0, pixels, terms / factor**2)
     faces = torch.cat([scene.faces, scene.faces.new_tensor([-1])])[seen]  # -1 picks the last
     lead = (scene.num_meshes, scene.num_views)
     return colors.view(*lead, -1, colors.shape[-1]), faces.view(*lead, height, width)
+
+
+def _differentiated(*tensors: Tensor) -> bool:
+    """Whether reverse or forward mode follows one of some tensors."""
+    reverse = torch.is_grad_enabled() and any(tensor.requires_grad for tensor in tensors)
+    forward = (unpack_dual(tensor).tangent for tensor in tensors)  # type: ignore[no-untyped-call]
+    return reverse or any(tangent is not None for tangent in forward)
 
 
 def _steps(meshes: int, views: int, size: tuple[int, int]) -> tuple[int, int]:
