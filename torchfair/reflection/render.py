@@ -70,9 +70,9 @@ def render_reflection(
     ``antialias``, whether it is asked for or not: exact derivatives of areas and colours, which follow the motion of
     every edge, inside the mesh, on its outline and where one part hides another. So the gradient without
     ``antialias`` is not that of the sampled image, which jumps as edges pass samples, but of the one it samples. It is
-    finite everywhere, in reverse and forward mode. Lines along which faces penetrate each other move without contributing, and edges that two
-    separate parts have in common, without being one edge of the topology, contribute twice. In functions compiled by
-    ``torch.compile`` pictures are left to eager mode (a graph break).
+    finite everywhere, in reverse and forward mode. Lines along which faces penetrate each other move without
+    contributing, and edges that two separate parts have in common, without being one edge of the topology, contribute
+    twice. In functions compiled by ``torch.compile`` pictures are left to eager mode (a graph break).
 
     Args:
         vertices: positions (*batch, V, 3), finite.
