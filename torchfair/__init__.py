@@ -2,7 +2,7 @@
 
 The parts are imported by name: ``torchfair.geometry``, ``torchfair.energies``, ``torchfair.shapes``,
 ``torchfair.stars``, ``torchfair.subdivision``, ``torchfair.projection``, ``torchfair.constraints``,
-``torchfair.formfinding``, ``torchfair.viewing``.
+``torchfair.formfinding``, ``torchfair.principal``, ``torchfair.viewing``.
 """
 
 from .energies import AngleVariation as AngleVariation
