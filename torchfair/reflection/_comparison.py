@@ -39,8 +39,8 @@ def dissimilarity(image: Tensor, reference: Tensor, window: Tensor) -> Tensor:
     shape = image.shape
     if min(shape[-2:]) <= WINDOW:  # too small for kornia to pad, and for a window
         return image.new_zeros(shape[:-2])
-    pair = (picture.expand(shape).reshape(-1, *shape[-3:]) for picture in (image, reference))
-    similarity = ssim(*pair, WINDOW, eps=0.0).view(shape)
+    first, second = (picture.expand(shape).reshape(-1, *shape[-3:]) for picture in (image, reference))
+    similarity = ssim(first, second, WINDOW, eps=0.0).view(shape)
     return masked_mean(1 - similarity, window[..., None, :, :])
 
 

@@ -43,6 +43,8 @@ class ReflectionScore:
             surroundings of 11 x 11 pixels.
         images: (views, k, H, W) stripes as the flat faces mirror them.
         reference_images: (views, k, H, W) stripes as the reference mirrors them.
+        coverage: (views, H, W) part of every pixel that the mesh covers.
+        reference_coverage: (views, H, W) part of every pixel that the reference covers.
         window: (views, H, W) bool, the pixels that are compared.
         setup: views, stripes and reference.
     """
@@ -55,6 +57,8 @@ class ReflectionScore:
     compared: Tensor
     images: Tensor
     reference_images: Tensor
+    coverage: Tensor
+    reference_coverage: Tensor
     window: Tensor
     setup: ReflectionSetup
 
@@ -133,6 +137,8 @@ def _compare(
         compared=window.to(error.dtype).mean((-2, -1)),
         images=flat.stripes,
         reference_images=smooth.stripes,
+        coverage=flat.coverage,
+        reference_coverage=smooth.coverage,
         window=window,
         setup=setup,
     )

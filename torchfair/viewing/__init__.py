@@ -16,7 +16,10 @@ from .picture_gauss_image import picture_gauss_image as picture_gauss_image
 from .picture_gauss_images import picture_gauss_images as picture_gauss_images
 from .picture_mesh import picture_mesh as picture_mesh
 from .picture_pyramids import picture_pyramids as picture_pyramids
+from .picture_reflections import picture_reflection_differences as picture_reflection_differences
+from .picture_reflections import picture_reflections as picture_reflections
 from .picture_star_classes import picture_star_classes as picture_star_classes
 from .render import MeshView as MeshView
+from .turntable import turntable as turntable
 from .view_direction import ViewDirection as ViewDirection
 from .view_direction import view_direction as view_direction

@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from torchfair.cli import main
+from torchfair.cli.reflect import numbers
+from torchfair.io import load_mesh, save_mesh
+from torchfair.reflection import reflection_score
+from torchfair.shapes import PrincipalParaboloid, irregular_triangles, principal_quads
+
+KEYS = ("score", "reflection_variation", "rms", "wobble")
+SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
+FEW_PIXELS = ("--size", "64", "--frames", "3")
+
+
+@pytest.fixture
+def mesh_file(tmp_path: Path) -> str:
+    path = tmp_path / "mesh.obj"
+    mesh = irregular_triangles(SADDLE, 120)
+    save_mesh(path, mesh.vertices, mesh.topology)
+    return str(path)
+
+
+@pytest.fixture
+def reference_file(tmp_path: Path) -> str:
+    path = tmp_path / "reference.off"
+    mesh = principal_quads(SADDLE, 30, 30)
+    save_mesh(path, mesh.vertices, mesh.topology)
+    return str(path)
+
+
+def read_json(text: str) -> dict[str, object]:
+    def refuse(token: str) -> float:
+        raise AssertionError(f"{token} is no JSON")
+
+    found: dict[str, object] = json.loads(text, parse_constant=refuse)
+    return found
+
+
+def test_numbers_are_those_of_the_library(
+    mesh_file: str, reference_file: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mesh, reference = load_mesh(mesh_file), load_mesh(reference_file)
+    for options, surface in (([], None), (["--reference", reference_file], (reference.vertices, reference.topology))):
+        assert main(["reflect", mesh_file, "--json", "--size", "64", *options]) == 0
+        report = read_json(capsys.readouterr().out)
+        expected = numbers(reflection_score(mesh.vertices, mesh.topology, surface, size=64))
+        assert {key: report[key] for key in KEYS} == {key: float(expected[key]) for key in KEYS}
+        assert all(report[key] > 0 for key in KEYS)  # type: ignore[operator]
+        assert len(report["score_by_view"]) == 6  # type: ignore[arg-type]
+        assert report["reference"] == (options[1] if options else None)
+
+
+def test_table(mesh_file: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reflect", mesh_file, "--size", "64"]) == 0
+    out = capsys.readouterr().out
+    assert all(word in out for word in ("1 - SSIM", "variation", "rms", "score by view"))
+    assert "wrote" not in out
+
+
+def test_files_are_written_once(mesh_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "out"
+    command = ["reflect", mesh_file, "-o", str(folder), *FEW_PIXELS]
+    assert main(command) == 0
+    names = {"reflection.json", "views.png", "differences.png", "turntable.gif"}
+    assert {path.name for path in folder.iterdir()} == names
+    with Image.open(folder / "turntable.gif") as film:
+        assert film.n_frames == 3
+        first = film.convert("L").tobytes()
+        film.seek(2)
+        assert film.convert("L").tobytes() != first
+    with Image.open(folder / "views.png") as sheet:
+        assert sheet.width > 6 * 64
+        assert len(sheet.convert("RGB").getcolors(1 << 24)) > 50
+    capsys.readouterr()
+    assert main(command) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert "--force" in line
+    assert main([*command, "--force", "--frames", "0"]) == 0
+    assert set(KEYS) <= set(read_json((folder / "reflection.json").read_text()))
+    plain = tmp_path / "plain"
+    assert main(["reflect", mesh_file, "-o", str(plain), "--no-pictures", "--size", "64"]) == 0
+    assert [path.name for path in plain.iterdir()] == ["reflection.json"]
+
+
+def test_a_mesh_that_is_not_where_its_reference_is_has_nothing_to_compare(
+    mesh_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mesh = principal_quads(SADDLE, 4, 4)
+    save_mesh(tmp_path / "far.obj", mesh.vertices + 100, mesh.topology)
+    folder = tmp_path / "out"
+    options = ["--reference", str(tmp_path / "far.obj"), "-o", str(folder), *FEW_PIXELS]
+    assert main(["reflect", mesh_file, *options]) == 0
+    assert "nothing to compare" in capsys.readouterr().out
+    report = read_json((folder / "reflection.json").read_text())
+    assert [report[key] for key in KEYS] == [0, 0, 0, 0]
+    assert len(list(folder.iterdir())) == 4
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--size", "8"], "at least 16"),
+        (["--size", "0"], "'0'"),
+        (["--frequency", "-1"], "'-1'"),
+        (["--frames", "-2"], "'-2'"),
+        (["--reference", "missing.obj"], "missing.obj"),
+    ],
+)
+def test_wrong_options_are_refused_in_one_line(
+    options: list[str], named: str, mesh_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+    assert main(["reflect", mesh_file, "-o", str(folder), *options]) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert named in line
+    assert not folder.exists()
+
+
+def test_interruption_leaves_whole_files_only(
+    mesh_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop(*arguments: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("torchfair.cli.frames.frame_progress", stop)
+    folder = tmp_path / "out"
+    assert main(["reflect", mesh_file, "-o", str(folder), *FEW_PIXELS]) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert {path.name for path in folder.iterdir()} == {"reflection.json", "views.png", "differences.png"}

@@ -1,0 +1,159 @@
+"""``torchfair reflect``: how smooth a mesh looks as a mirror."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .arguments import count, positive_count, positive_or_none
+from .errors import CommandError
+from .inputs import read_input
+from .outputs import refuse_existing
+from .plain import to_json
+
+if TYPE_CHECKING:
+    from ..io import PolygonMesh
+    from ..reflection import ReflectionScore
+
+NAME = "torchfair reflect"
+REPORT = "reflection.json"
+PICTURES = ("views.png", "differences.png")
+TURNTABLE = "turntable.gif"
+_LEAST_SIZE = 16
+_DESCRIPTION = (
+    "Renders a polygon mesh as a mirror, every face plane, among stripes, and compares the pictures with those of a "
+    "smooth surface: the reference, or the same mesh smoothly shaded. The score is 1 - SSIM, averaged over views and "
+    "stripe directions: 0 for the picture of the smooth surface."
+)
+_ROWS = {
+    "score": "score (1 - SSIM; 0 is smooth)",
+    "reflection_variation": "reflection variation (over the root of the area)",
+    "rms": "error of the mirrored direction (rms)",
+    "wobble": "  what is left of it beyond one edge length",
+}
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds ``reflect`` to the commands."""
+    parser: argparse.ArgumentParser = subparsers.add_parser(
+        "reflect", help="judge a mesh by its reflections", description=_DESCRIPTION, allow_abbrev=False
+    )
+    add = parser.add_argument
+    add("input", metavar="INPUT", help="mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh), or example:roof")
+    add("--reference", metavar="FILE", help="smooth surface to compare with: a fine mesh, mirrored with its vertex "
+        "normals (default: the input itself)")  # fmt: skip
+    add("--json", action="store_true", help="print one JSON object instead of a table")
+    add("-o", "--output", metavar="FOLDER", help=f"folder for {REPORT}, pictures and a turntable; nothing is written "
+        "without it")  # fmt: skip
+    add("--size", type=positive_count, default=256, metavar="PIXELS", help="pixels along a picture (default 256)")
+    add("--frequency", type=positive_or_none, default=None, metavar="F", help="stripe pairs per unit of the mirrored "
+        "direction (default: such that the smooth surface shows about four)")  # fmt: skip
+    add("--frames", type=count, default=36, metavar="N", help="pictures of the turntable, 0 for none (default 36)")
+    add("--no-pictures", action="store_true", help="write no pictures and no turntable")
+    add("--force", action="store_true", help="replace files that exist")
+    add("--repair", action="store_true", help="orient faces consistently and drop unused vertices first")
+    parser.set_defaults(run=run, name=NAME)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Checks what can be checked first, then reads, renders, writes and prints."""
+    files = _files(arguments)
+    if arguments.size < _LEAST_SIZE:
+        raise CommandError(f"--size {arguments.size}: pictures need at least {_LEAST_SIZE} pixels to be compared")
+    mesh = read_input(arguments.input, arguments.repair)
+    reference = read_input(arguments.reference, arguments.repair) if arguments.reference else None
+    score = _score(mesh, reference, arguments)
+    report = numbers(score)
+    report |= {"file": arguments.input, "reference": arguments.reference, "repairs": list(mesh.repairs)}
+    if files:
+        write(files, mesh, score, report, arguments)
+    if arguments.json:
+        sys.stdout.write(to_json(report))
+        return 0
+    for sentence in mesh.repairs:
+        print(f"repaired: {sentence}")
+    print(f"{arguments.input}\n{format_numbers(report)}")
+    print("".join(f"wrote {path}\n" for path in files), end="")
+    return 0
+
+
+def numbers(score: ReflectionScore) -> dict[str, Any]:
+    """What the JSON holds: the four numbers, those of every view, and what was looked at."""
+    import torch
+
+    setup = score.setup
+    waves = torch.linalg.vector_norm(setup.stripes.waves, dim=-1, keepdim=True)
+    return {
+        **{key: getattr(score, key) for key in _ROWS},
+        "score_by_view": score.per_view.mean(-1),
+        "compared": score.compared,
+        "view_directions": setup.camera.axes[:, 2],
+        "stripe_directions": setup.stripes.waves / waves,
+        "stripe_frequency": waves[0, 0] / (2 * torch.pi),
+        "size": setup.size,
+    }
+
+
+def format_numbers(report: dict[str, Any]) -> str:
+    """The four numbers and the scores of the views as lines of text."""
+    width = max(map(len, _ROWS.values()))
+    lines = ["", *(f"  {label:<{width}}  {float(report[key]):>9.4g}" for key, label in _ROWS.items())]
+    if not report["compared"].any():
+        return "\n".join([*lines, "", "nothing to compare: no view shows the mesh on more than a few pixels"])
+    lines += ["", "score by view, and the part of the picture that was compared"]
+    views = zip(report["score_by_view"].tolist(), report["compared"].tolist(), strict=True)
+    lines += [f"  {view + 1:>3}  {value:>9.4g}  {100 * part:>5.1f} %" for view, (value, part) in enumerate(views)]
+    return "\n".join(lines)
+
+
+def write(
+    files: list[Path],
+    mesh: PolygonMesh,
+    score: ReflectionScore,
+    report: dict[str, Any],
+    arguments: argparse.Namespace,
+) -> None:
+    """Writes report, pictures and turntable, each whole or not at all."""
+    from ..io import atomic_write_text
+
+    files[0].parent.mkdir(parents=True, exist_ok=True)
+    atomic_write_text(files[0], to_json(report), overwrite=arguments.force)
+    if len(files) == 1:
+        return
+    from ..viewing.picture_reflections import picture_reflection_differences, picture_reflections
+    from ..viewing.turntable import turntable
+    from .frames import frame_progress
+
+    name = Path(arguments.input).name
+    picture_reflections(files[1], score, name, overwrite=arguments.force)
+    picture_reflection_differences(files[2], score, name, overwrite=arguments.force)
+    if arguments.frames:
+        with frame_progress(arguments.frames, "turntable") as progress:
+            turntable(
+                files[3], mesh.vertices, mesh.topology, score.setup.reference,
+                frames=arguments.frames, progress=progress, overwrite=arguments.force,
+            )  # fmt: skip
+
+
+def _score(mesh: PolygonMesh, reference: PolygonMesh | None, arguments: argparse.Namespace) -> ReflectionScore:
+    from ..reflection import reflection_score
+
+    return reflection_score(
+        mesh.vertices,
+        mesh.topology,
+        None if reference is None else (reference.vertices, reference.topology),
+        frequency=arguments.frequency,
+        size=arguments.size,
+    )
+
+
+def _files(arguments: argparse.Namespace) -> list[Path]:
+    """The files to write, the report first; refuses those that exist."""
+    if arguments.output is None:
+        return []
+    pictures = () if arguments.no_pictures else (*PICTURES, *((TURNTABLE,) if arguments.frames else ()))
+    files = [Path(arguments.output) / name for name in (REPORT, *pictures)]
+    refuse_existing(files, force=arguments.force)
+    return files

@@ -1,0 +1,82 @@
+"""A mirroring mesh that turns, as an animated GIF."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from ..io.atomic import atomic_write_bytes
+from ..reflection import OrthographicCamera, Stripes, render_reflection, ring_directions
+from ..reflection.smooth_reference import SmoothReference
+from ..topology import Topology
+from .picture_reflections import mirror_colors
+from .view_direction import view_direction
+
+_ELEVATION = 38.0
+_MILLISECONDS = 80
+_BANDS = 8
+
+
+def turntable(
+    path: str | os.PathLike[str],
+    vertices: Tensor,
+    topology: Topology,
+    reference: SmoothReference | None = None,
+    *,
+    frames: int = 36,
+    size: int = 320,
+    progress: Callable[[int], object] | None = None,
+    overwrite: bool = False,
+) -> None:
+    """Writes an animated GIF: the mesh as a mirror on a turntable, and a smooth reference beside it.
+
+    The surroundings have horizontal stripes and stay where they are; so do the lamps of a hall around a model.
+
+    Args:
+        path: the GIF file.
+        vertices: positions ``(V, 3)``, finite.
+        topology: connectivity.
+        reference: the smooth surface to show beside the mesh; by default the mesh itself, smoothly shaded.
+        frames: pictures per turn, at least 1.
+        size: rows of pixels; there are twice as many columns.
+        progress: called with the number of finished frames.
+        overwrite: whether an existing file may be replaced.
+
+    Raises:
+        ShapeError: if positions are not one mesh that fits the topology, or for less than one frame.
+        TorchfairError: if a vertex is not finite.
+        MeshFileError: if the file cannot be written.
+    """
+    from PIL import Image
+
+    smooth = reference or SmoothReference.of_mesh(vertices, topology)
+    up = view_direction(vertices, topology).up
+    directions = ring_directions(up, _ELEVATION, frames)
+    stripes = Stripes(up, _BANDS / 2)
+    everything = OrthographicCamera.fit(vertices[topology.corners], smooth.vertices, directions=directions, ups=up)
+    reach = float(everything.half_widths.max())  # the same scale throughout
+    target = everything.targets.mean(0)
+    pictures = []
+    for frame, direction in enumerate(directions):
+        camera = OrthographicCamera(direction, target, reach, up)
+        pair = [
+            render_reflection(vertices, topology, camera, stripes, size=size, supersampling=2),
+            render_reflection(
+                smooth.vertices, smooth.topology, camera, stripes, size=size, supersampling=2, shading="smooth",
+                normals=smooth.normals,
+            ),
+        ]  # fmt: skip
+        colors = torch.cat([mirror_colors(p.image[0, 0], p.coverage[0]).to(torch.float32) for p in pair], dim=1)
+        pixels = (colors.clamp(0, 1) * 255).round().to("cpu", torch.uint8).numpy()
+        pictures.append(Image.fromarray(pixels).quantize(32, dither=Image.Dither.NONE))
+        if progress is not None:
+            progress(frame + 1)
+    data = io.BytesIO()
+    pictures[0].save(
+        data, "gif", save_all=True, append_images=pictures[1:], duration=_MILLISECONDS, loop=0, optimize=False
+    )
+    atomic_write_bytes(path, data.getvalue(), overwrite=overwrite)
