@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import torch
 from torch import Tensor
+
+from ..errors import TorchfairError
 
 
 def look_axes(forward: Tensor, ups: Tensor) -> Tensor:
@@ -21,6 +24,14 @@ def look_axes(forward: Tensor, ups: Tensor) -> Tensor:
     right = torch.where(parallel, torch.linalg.cross(forward, other), right)
     right = right / torch.linalg.vector_norm(right, dim=-1, keepdim=True)
     return torch.stack([right, torch.linalg.cross(right, forward), forward], dim=1)
+
+
+def check_frame(margin: float, aspect: float) -> None:
+    """Raises TorchfairError unless ``margin`` is within 0 to below 0.5 and ``aspect`` positive."""
+    if not 0 <= margin < 0.5:
+        raise TorchfairError(f"margin must be at least 0 and below 0.5, got {margin}")
+    if not 0 < aspect < math.inf:
+        raise TorchfairError(f"aspect must be positive, got {aspect}")
 
 
 def points_to_fit(vertices: Sequence[Tensor]) -> Tensor:

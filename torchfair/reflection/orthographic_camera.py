@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from ._camera_fit import fit_windows, look_axes, points_to_fit
+from ._camera_fit import check_frame, fit_windows, look_axes, points_to_fit
 from .camera import Camera, Size, camera_rows, fill_attributes, height_and_width, positive_numbers, unit_directions
 
 
@@ -70,7 +70,12 @@ class OrthographicCamera(Camera):
             ups: (views, 3) or (3,) directions that appear vertical, z by default.
             margin: free part of the picture on every side, 0 to below 0.5.
             aspect: width over height of the picture.
+
+        Raises:
+            ShapeError: if a tensor has another shape.
+            TorchfairError: if a direction is zero or not finite, or ``margin`` or ``aspect`` out of range.
         """
+        check_frame(margin, aspect)
         camera = cls(directions, ups=ups)
         targets, half_widths = fit_windows(points_to_fit(vertices), camera.axes, margin, aspect)
         return cls(camera.directions, targets, half_widths, camera.ups)

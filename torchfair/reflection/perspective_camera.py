@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ..errors import TorchfairError
-from ._camera_fit import fit_eyes, look_axes, points_to_fit
+from ._camera_fit import check_frame, fit_eyes, look_axes, points_to_fit
 from .camera import Camera, Size, camera_rows, fill_attributes, height_and_width, positive_numbers, unit_directions
 from .orthographic_camera import OrthographicCamera
 
@@ -66,8 +66,10 @@ class PerspectiveCamera(Camera):
     ) -> PerspectiveCamera:
         """The closest eyes that see all the given points along ``directions`` with some margin.
 
-        Args as for :meth:`OrthographicCamera.fit`, and ``fields_of_view`` (views,) or one number in degrees.
+        Arguments and errors as for :meth:`OrthographicCamera.fit`, and ``fields_of_view`` (views,) or one number in
+        degrees.
         """
+        check_frame(margin, aspect)
         start = OrthographicCamera(directions, ups=ups)
         angles = positive_numbers("fields_of_view", fields_of_view, start.num_views)
         points = points_to_fit(vertices)
