@@ -91,7 +91,7 @@ def test_axes_are_a_rotation_even_where_up_is_the_line_of_sight(kind: type[Ortho
     camera = kind.fit(cloud(9, 3), directions=directions)
     right, up, forward = camera.axes.unbind(1)
     assert torch.allclose(camera.axes @ camera.axes.mT, torch.eye(3, dtype=DOUBLE).expand(11, 3, 3), atol=1e-14)
-    assert torch.allclose(torch.linalg.cross(right, forward), -up, atol=1e-14)
+    assert torch.allclose(torch.linalg.cross(right, forward), up, atol=1e-14)
     assert torch.allclose(forward, torch.nn.functional.normalize(directions, dim=-1), atol=1e-14)
 
 
