@@ -12,7 +12,7 @@ from principal_lattices import LATTICES, cone, relabelled, twisted_torus
 from torchfair import MeshError, ShapeError, Topology
 from torchfair._graph import edge_numbers
 from torchfair.principal import PrincipalEdges, principal_edges_from_seed, principal_edges_of_lattice
-from torchfair.shapes import Catenoid, Sphere, irregular_triangles, principal_quads
+from torchfair.shapes import Catenoid, Enneper, Sphere, irregular_triangles, principal_quads, principal_triangles
 
 every_lattice = pytest.mark.parametrize("name", LATTICES)
 
@@ -169,9 +169,16 @@ def test_one_triangle_and_closed_shells() -> None:
     assert len(set(solid.edges[edges.mask].ravel().tolist())) == 4
 
 
-def test_lattices_around_poles_and_meshes_that_are_none() -> None:
-    from torchfair.shapes import principal_triangles
+@pytest.mark.parametrize("along", ["u", "v"])
+def test_lattices_of_a_single_row_have_the_direction_of_most_edges(along: str) -> None:
+    rows, columns = (1, 5) if along == "u" else (5, 1)
+    mesh = principal_triangles(Enneper(), rows, columns, along=along)
+    edges = principal_edges_of_lattice(mesh)
+    assert edges.stars().vertices.numel() == 0
+    assert torch.equal(edges.mask, mesh.edges_along(along))
 
+
+def test_lattices_around_poles_and_meshes_that_are_none() -> None:
     for along in ("u", "v"):
         mesh = principal_triangles(Sphere(), 6, 8, along=along)
         edges = principal_edges_of_lattice(mesh, along)

@@ -115,6 +115,16 @@ def test_isometry_error_against_a_slow_loop() -> None:
         assert error == pytest.approx(max(abs(ratio - 1) for ratio in ratios), abs=1e-15)
 
 
+def test_long_strips_keep_their_lengths() -> None:
+    angle = torch.arange(5_001, dtype=DOUBLE) / 100
+    points = torch.stack([10 * angle.cos(), 10 * angle.sin(), angle], dim=1)
+    outward = torch.stack([angle.cos(), angle.sin(), 0 * angle], dim=1)
+    strips = developable_strips(points, [torch.arange(5_001)], outward, 0.05, depth=0.05)
+    assert strips.isometry_errors.max() < 1e-6
+    rulings = strips.uv.view(-1, 2, 2)
+    assert torch.allclose(torch.linalg.vector_norm(rulings[:, 1] - rulings[:, 0], dim=1), torch.tensor(0.1).double())
+
+
 @every_lattice
 def test_planarity_is_the_determinant_of_normals_and_edge(name: str) -> None:
     """The diagonals p, q of a quad from b - a have det(p, q, b - a) = h^2 det(n(w), n(v), w - v)."""

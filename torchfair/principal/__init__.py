@@ -11,6 +11,9 @@ from .labels import principal_edges_from_seed as principal_edges_from_seed
 from .labels import principal_edges_of_lattice as principal_edges_of_lattice
 from .principal_edges import PrincipalEdges as PrincipalEdges
 from .principal_edges import PrincipalStars as PrincipalStars
+from .spheres import StarSpheres as StarSpheres
+from .spheres import principal_normals as principal_normals
+from .spheres import star_spheres as star_spheres
 from .strip_files import save_strips_dxf as save_strips_dxf
 from .strip_files import save_strips_obj as save_strips_obj
 from .strip_files import save_strips_svg as save_strips_svg

@@ -35,7 +35,6 @@ def unroll(rulings: Floats) -> Floats:
     ruling = (along - 1j * aside) * to_d / base  # from b to c
     length = np.abs(ruling)
     turns = np.cumprod(np.concatenate([[1.0 + 0j], ruling / (1j * length)]))
-    turns /= np.abs(turns)
     lower = np.concatenate([[0j], np.cumsum(turns[:-1] * to_b)])
     upper = lower + turns * 1j * np.concatenate([np.linalg.norm(d[:1] - a[:1], axis=1), length])
     points = np.stack([lower, upper], axis=1)

@@ -11,8 +11,11 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from ..geometry import vertex_normals
 from ..geometry._ops import cross, dot, gather, norm
-from .principal_edges import PrincipalStars
+from .principal_edges import PrincipalEdges, PrincipalStars
+
+_STIFF = 1e12
 
 
 class StarSpheres(NamedTuple):
@@ -72,3 +75,35 @@ def spheres_through(centres: Tensor, neighbours: Tensor) -> StarSpheres:
     return StarSpheres(normals, curvatures, misses)
 
 
+def principal_normals(vertices: Tensor, principal: PrincipalEdges, stars: PrincipalStars | None = None) -> Tensor:
+    """Unit normals n(v) with which strips along principal edges are developable, where the conditions hold.
+
+    Args:
+        vertices: positions (V, 3), any length unit.
+        principal: the principal edges.
+        stars: where conditions hold; by default all of ``principal.stars()``.
+
+    Returns:
+        (V, 3). At stars the normals of their spheres. At other vertices the vertex normal, turned into the planes that
+        principal edges to stars span with the normals there: of one such edge the nearest normal in its plane, of two
+        the line in which both planes meet, of more, as at singular vertices, the best compromise. Zero where neither
+        exists.
+    """
+    stars = principal.stars() if stars is None else stars
+    spheres = star_spheres(vertices, stars)
+    normals = vertex_normals(vertices, principal.topology).clone()
+    is_star = torch.zeros(vertices.shape[0], dtype=torch.bool, device=vertices.device)
+    is_star[stars.vertices] = True
+    normals[stars.vertices] = torch.where(spheres.normals == 0, normals[stars.vertices], spheres.normals)
+    edges = principal.topology.edges[principal.mask]
+    edges = torch.cat([edges, edges.flip(1)])
+    star, other = edges[is_star[edges[:, 0]] & ~is_star[edges[:, 1]]].unbind(1)
+    across = cross(vertices[other] - vertices[star], normals[star])
+    across = across / norm(across).clamp_min(1e-300)[:, None]
+    identity = torch.eye(3, dtype=vertices.dtype, device=vertices.device)
+    stiffness = identity.repeat(vertices.shape[0], 1, 1)
+    stiffness.index_add_(0, other, _STIFF * across[:, :, None] * across[:, None, :])
+    turned = torch.linalg.solve(stiffness[other], normals[other][..., None])[..., 0]
+    lengths = norm(turned)[:, None]
+    normals[other] = torch.where(lengths > 0, turned / lengths.clamp_min(1e-300), normals[other])
+    return normals
