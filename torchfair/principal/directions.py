@@ -27,8 +27,8 @@ class AlignedEdges(NamedTuple):
         edges: the choice.
         misalignment: mean angle in radians, 0 to pi/2, between a principal edge and the mean of the directions at its
             ends, seen along the vertex normals. Near 0 on meshes that follow the directions. Where equilateral
-            triangles lie at random between two orthogonal directions, the best choice has pi/24 = 0.13 on average,
-            0.26 at worst.
+            triangles lie at a constant angle to two orthogonal directions, the best choice has 0.26 (15 degrees) or
+            less; where directions turn against the lattice or are noise, it tends to pi/4 = 0.79.
         chosen: (F,) which of the directions, 0 or 1, the principal edge of each face follows; the same in each
             component. With computed directions 0 is that of the larger principal curvature, with its sign.
     """
