@@ -8,6 +8,7 @@ from .closeness import distance_limit_terms as distance_limit_terms
 from .element_quality import corner_angle_terms as corner_angle_terms
 from .element_quality import face_area_terms as face_area_terms
 from .fairness import boundary_fairness_terms as boundary_fairness_terms
+from .fairness import displacement_fairness_terms as displacement_fairness_terms
 from .fairness import even_fairness_terms as even_fairness_terms
 from .fairness import interior_fairness_terms as interior_fairness_terms
 from .fairness import tangential_fairness_terms as tangential_fairness_terms
@@ -15,6 +16,9 @@ from .gliding import gliding_terms as gliding_terms
 from .handles import handle_terms as handle_terms
 from .normal_variation import normal_variation_terms as normal_variation_terms
 from .planarity import planarity_terms as planarity_terms
+from .principal_symmetric import coplanar_terms as coplanar_terms
+from .principal_symmetric import cospherical_terms as cospherical_terms
+from .saddle_sides import SaddleSides as SaddleSides
 from .stars import pyramid_terms as pyramid_terms
 from .stars import saddle_terms as saddle_terms
 from .tangent_planes import BoundaryNormals as BoundaryNormals

@@ -9,6 +9,7 @@ from ..geometry import umbrella_vectors, vertex_normals
 from ..polylines import straight_triples
 from ..projection import ElementTerm
 from ..projection.layout import State
+from ..projection.term import Residual
 from ..topology import Topology
 from .star_stencils import closed_star_stencils
 
@@ -85,16 +86,46 @@ def even_fairness_terms(
     """
     even = _even_umbrellas(vertices, topology)
     return [
-        ElementTerm(
-            "fairness",
-            umbrella_offset,
-            [(block, stencil)],
-            data=(even[stencil[:, 0]],),
-            weight=weight,
-            linear=True,
-        )
+        _offset_term("fairness", umbrella_offset, stencil, even[stencil[:, 0]], weight, block)
         for stencil in closed_star_stencils(topology)
     ]
+
+
+def displacement_fairness_terms(
+    base: Tensor, topology: Topology, *, weight: float, block: str = "vertices"
+) -> list[ElementTerm]:
+    """Umbrella vectors of the displacement from ``base`` (V, 3): a pulled vertex takes its surroundings along.
+
+    At boundary vertices second differences along the boundary stand for umbrella vectors. Zero at ``base`` and
+    wherever it is translated to.
+    """
+    terms = [
+        _offset_term("fairness", umbrella_offset, stencil, umbrella_of(base, stencil), weight, block)
+        for stencil in closed_star_stencils(topology)
+    ]
+    triples = straight_triples(topology)
+    triples = triples[topology.is_boundary_vertex[triples[:, 1]]]
+    if triples.numel():
+        start, middle, end = base[triples].unbind(1)
+        target = 0.5 * (start + end) - middle
+        terms.append(_offset_term("boundary fairness", difference_offset, triples, target, weight, block))
+    return terms
+
+
+def umbrella_of(vertices: Tensor, stencil: Tensor) -> Tensor:
+    """(n, 3) umbrella vectors of stars ``stencil`` (n, 1 + k)."""
+    return vertices[stencil[:, 1:]].mean(1) - vertices[stencil[:, 0]]
+
+
+def difference_offset(x: Tensor, target: Tensor) -> Tensor:
+    """:func:`second_difference` minus a given vector."""
+    return second_difference(x) - target
+
+
+def _offset_term(
+    name: str, residual: Residual, stencil: Tensor, target: Tensor, weight: float, block: str
+) -> ElementTerm:
+    return ElementTerm(name, residual, [(block, stencil)], data=(target,), weight=weight, linear=True)
 
 
 def umbrella_offset(x: Tensor, target: Tensor) -> Tensor:

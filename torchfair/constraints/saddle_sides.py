@@ -1,0 +1,127 @@
+r"""Saddle sides of principal-symmetric stars (paper section 5.2): principal neighbours lie beyond the tangent plane.
+
+The paper asks that, where the angle sum is above 2 pi, principal neighbours lie on one side of the tangent plane of
+the sphere and cospherical ones on the other. That leaves stars near parabolic curves of the surface, where principal
+polylines are curved sideways, in one half-plane: not saddle-shaped, with a self-intersecting pyramid. Saddle-shaped
+they are if the principal neighbours lie beyond the planes of both faces without a principal edge, v w2 w3 and
+v w5 w6, and then they lie beyond the tangent plane too::
+
+        w3    w2
+          \  /
+    w4 --- v --- w1
+          /  \
+        w5    w6
+
+A star near a parabolic curve may as well lose its negative curvature; which of the two is nearer is decided in
+:meth:`SaddleSides.decide`, for each star that is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from ..geometry._ops import cross, dot, norm
+from ..principal.principal_edges import PrincipalStars
+from ..principal.spheres import star_spheres
+from ..projection import ElementTerm
+from ..projection.layout import State
+
+NEGATIVE = 1e-9  # radians by which the angle sum is above 2 pi where curvature counts as negative
+_FLATTEST = 1e-2  # curvature times edge length below which a sphere counts as this
+
+
+def star_stencil(stars: PrincipalStars) -> Tensor:
+    """(R, 7) vertices v, w1, ..., w6 of every star."""
+    first, fourth = stars.principal.unbind(1)
+    w2, w3, w5, w6 = stars.cospherical.unbind(1)
+    return torch.stack([stars.vertices, first, w2, w3, fourth, w5, w6], dim=1)
+
+
+def angle_excess(x: Tensor) -> Tensor:
+    """Angle sum minus 2 pi at the first of the vertices ``x`` (n, 7, 3); positive where curvature is negative."""
+    spokes = x[:, 1:] - x[:, :1]
+    after = spokes.roll(-1, 1)
+    angles = torch.atan2(norm(cross(spokes, after)), dot(spokes, after))
+    return angles.sum(1) - 2.0 * math.pi
+
+
+def face_side_curvatures(x: Tensor) -> Tensor:
+    """``2 n.d / |d|^2`` for the spokes d to w1 and w4 and the unit normals n of the faces v w2 w3 and v w5 w6, (n, 4).
+
+    That is the curvature of a circle that touches the plane of the face in v and passes through the neighbour.
+    """
+    spokes = x[:, 1:] - x[:, :1]
+    principal = spokes[:, [0, 3]]
+    normals = cross(spokes[:, [1, 4]], spokes[:, [2, 5]])
+    normals = normals / norm(normals).clamp_min(1e-12)[..., None]
+    heights = dot(normals[:, :, None], principal[:, None])
+    return (2.0 * heights / dot(principal, principal).clamp_min(1e-24)[:, None]).flatten(1)
+
+
+class SaddleSides:
+    """For every star what it is to be: saddle-shaped, or not negatively curved.
+
+    Args:
+        stars: Regular vertices.
+        margin: How far beyond the bounds stars are pushed, in curvatures of their spheres.
+        block: Name of the vertex block.
+    """
+
+    def __init__(self, stars: PrincipalStars, *, margin: float = 0.05, block: str = "vertices") -> None:
+        self.stars, self.margin, self.block = stars, margin, block
+        self.stencil = star_stencil(stars)
+        count = stars.vertices.shape[0]
+        self.is_saddle = torch.zeros(count, dtype=torch.bool)
+        self._data: tuple[Tensor, ...] = ()
+
+    def decide(self, vertices: Tensor) -> int:
+        """Decides at ``vertices`` (V, 3), for the terms from now on.
+
+        Stars whose angle sum is at most 2 pi are to stay so; those above 2 pi are to be saddle-shaped, unless it
+        takes a smaller change of the curvature along the principal edges to bring the angle sum below 2 pi.
+
+        Returns:
+            How many stars with an angle sum above 2 pi are not saddle-shaped.
+        """
+        x = vertices[self.stencil]
+        curvatures = star_spheres(vertices, self.stars).curvatures
+        scale = curvatures.abs().clamp_min(_FLATTEST)
+        sign = torch.where(curvatures < 0, -1.0, 1.0).to(x.dtype)
+        spokes = x[:, 1:] - x[:, :1]
+        area = norm(cross(spokes, spokes.roll(-1, 1))).sum(1) / 6.0
+        excess = angle_excess(x)
+        short = (sign[:, None] * face_side_curvatures(x)).amax(1).clamp_min(0.0)
+        self.is_saddle = (excess > 0.0) & (short <= excess / (area * scale))
+        self._data = (self.is_saddle.to(x.dtype), sign / scale, 1.0 / (scale * scale * area))
+        return self.count_wrong(vertices)
+
+    def are_negative(self, vertices: Tensor) -> Tensor:
+        """(R,) bool: stars with an angle sum above 2 pi at ``vertices`` (V, 3)."""
+        return angle_excess(vertices[self.stencil]) > NEGATIVE
+
+    def count_wrong(self, vertices: Tensor) -> int:
+        """How many stars with an angle sum above 2 pi are not saddle-shaped at ``vertices`` (V, 3)."""
+        x = vertices[self.stencil]
+        curvatures = star_spheres(vertices, self.stars).curvatures
+        beyond = (torch.sign(curvatures)[:, None] * face_side_curvatures(x) < 0.0).all(1)
+        return int((self.are_negative(vertices) & ~beyond).sum())
+
+    def __call__(self, state: State) -> tuple[Tensor, ...]:
+        """Data of the terms."""
+        if not self._data:
+            self.decide(state[self.block])
+        return self._data
+
+    def lacking(self, x: Tensor, is_saddle: Tensor, per_curvature: Tensor, per_excess: Tensor) -> Tensor:
+        """By how much stars ``x`` (n, 7, 3) miss what they are to be, (n, 5), in curvatures of their spheres."""
+        sides = torch.relu(self.margin + per_curvature[:, None] * face_side_curvatures(x))
+        excess = torch.relu(0.4 * self.margin + per_excess * angle_excess(x))
+        return torch.cat([is_saddle[:, None] * sides, ((1.0 - is_saddle) * excess)[:, None]], dim=1)
+
+    def terms(self, *, weight: float) -> list[ElementTerm]:
+        """One element for each star."""
+        stencil = [(self.block, self.stencil)]
+        return [ElementTerm("saddle sides", self.lacking, stencil, weight=weight, refresh=self, batched=True)]

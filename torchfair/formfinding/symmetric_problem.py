@@ -1,0 +1,161 @@
+"""The problem of a principal-symmetric mesh on one level of refinement, compiled once for many edits."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from torch import Tensor
+
+from .. import constraints as c
+from ..constraints.closeness import TangentPlanes
+from ..constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
+from ..constraints.handles import offset
+from ..constraints.lifted_principal_symmetric import lifted_blocks, lifted_principal_symmetric_terms
+from ..constraints.principal_symmetric import between_stars, sphere_blocks
+from ..constraints.saddle_sides import SaddleSides
+from ..geometry import corner_angles
+from ..geometry.closest_point import ReferenceSurface
+from ..principal import PrincipalEdges
+from ..principal.principal_edges import PrincipalStars
+from ..projection import ElementTerm, GuidedProjection
+from ..projection.layout import State
+from .face_guard import FaceGuard
+from .symmetric_settings import SymmetricSettings
+
+_SAFE_ANGLE = 2.5  # smallest angles at which the barrier sets in
+
+
+class Aim(Enum):
+    """What a run is for."""
+
+    SHAPE = "conditions, saddle sides and everything else, weighted"
+    TIGHT = "the same with conditions weighted more"
+    EXACT = "conditions alone; handles keep their places"
+    RELEASED = "conditions alone"
+
+
+class SymmetricProblem:
+    """Terms and compiled runs for one mesh in normalised units.
+
+    Args:
+        base: (V, 3) where fairness wants to see the displacement zero.
+        principal: Which edges are principal.
+        stars: Where conditions are imposed.
+        handles: (n,) vertices that are pulled.
+        fixed: (V,) vertices that do not move.
+        reference: Surface to stay close to.
+        settings: Weights.
+
+    Attributes:
+        targets: (n, 3) of the handles; assign to move them.
+        sides: What stars are to be; see :class:`~torchfair.constraints.saddle_sides.SaddleSides`.
+    """
+
+    def __init__(
+        self,
+        base: Tensor,
+        principal: PrincipalEdges,
+        stars: PrincipalStars,
+        handles: Tensor,
+        fixed: Tensor,
+        reference: ReferenceSurface | None,
+        settings: SymmetricSettings,
+    ) -> None:
+        self.base, self.topology, self.stars, self.settings = base, principal.topology, stars, settings
+        self.handles, self.fixed, self.targets = handles, fixed, base[handles]
+        self.edges = between_stars(self.topology.edges[principal.mask], stars)
+        self.sides = SaddleSides(stars, margin=settings.saddle_margin)
+        self._planes = None if reference is None else TangentPlanes(reference)
+        self._compiled: dict[Aim, GuidedProjection] = {}
+        self._angles = corner_angles(base, self.topology)
+        self._smallest_angle = min(settings.smallest_angle, 0.8 * float(self._angles.min()))
+        self._keeps_faces = FaceGuard(self.topology, lambda state: state["vertices"])
+
+    def blocks(self, vertices: Tensor) -> State:
+        """Variable blocks that fit ``vertices``."""
+        if self.settings.formulation == "spheres":
+            return {"vertices": vertices, **sphere_blocks(vertices, self.stars)}
+        if self.settings.formulation == "lifted":
+            return {"vertices": vertices, **lifted_blocks(vertices, self.edges, self.stars)}
+        return {"vertices": vertices}
+
+    def compiled(self, aim: Aim) -> GuidedProjection:
+        """The run of an aim, with its symbolic analysis made once."""
+        if aim not in self._compiled or self.settings.formulation == "lifted":
+            fixed = self.fixed.clone()
+            if aim is Aim.EXACT:
+                fixed[self.handles] = True
+            self._compiled[aim] = GuidedProjection(
+                self.blocks(self.base),
+                self.terms(aim),
+                fixed={"vertices": fixed[:, None].expand(-1, 3).contiguous()},
+                solver=self.settings.projection.solver,
+            )
+        return self._compiled[aim]
+
+    def terms(self, aim: Aim) -> list[ElementTerm]:
+        """Element terms of an aim."""
+        settings = self.settings
+        if aim in (Aim.EXACT, Aim.RELEASED):
+            return self._conditions(settings.constraint_weight)
+        weight = settings.constraint_weight if aim is Aim.SHAPE else settings.tight_weight
+        return [
+            *self._conditions(weight),
+            *self.sides.terms(weight=settings.saddle_weight),
+            *c.displacement_fairness_terms(self.base, self.topology, weight=settings.fairness_weight),
+            *self._handles(),
+            *self._closeness(),
+            *self._energy(),
+            *self._quality(),
+        ]
+
+    def _conditions(self, weight: float) -> list[ElementTerm]:
+        if self.settings.formulation == "eliminated":
+            return eliminated_principal_symmetric_terms(self.edges, self.stars, weight=weight)
+        if self.settings.formulation == "lifted":
+            return lifted_principal_symmetric_terms(self.edges, self.stars, self.sides.is_saddle, weight=weight)
+        return [
+            *c.cospherical_terms(self.stars, weight=weight),
+            *c.coplanar_terms(self.edges, self.stars, weight=weight),
+        ]
+
+    def _handles(self) -> list[ElementTerm]:
+        if not self.handles.numel():
+            return []
+        stencil = [("vertices", self.handles[:, None])]
+        return [
+            ElementTerm(
+                "handles",
+                offset,
+                stencil,
+                weight=self.settings.handle_weight,
+                refresh=lambda state: (self.targets,),
+            )
+        ]
+
+    def _closeness(self) -> list[ElementTerm]:
+        if self._planes is None:
+            return []
+        count = self.topology.num_vertices
+        return c.closeness_terms(self._planes, count, weight=self.settings.closeness_weight)
+
+    def _energy(self) -> list[ElementTerm]:
+        settings = self.settings
+        if not settings.energy_weight:
+            return []
+        return c.normal_variation_terms(
+            self.topology, smoothing=settings.energy_smoothing, weight=settings.energy_weight
+        )
+
+    def _quality(self) -> list[ElementTerm]:
+        smallest = self._smallest_angle
+        if not smallest > 0.0:
+            return []
+        safe = self._angles.clamp(max=_SAFE_ANGLE * smallest).clamp_min(1.1 * smallest)
+        return c.corner_angle_terms(self.topology, smallest, safe, weight=0.1)
+
+    def admits(self, state: State, trial: State) -> bool:
+        """Whether a step may be taken: no face turns over, and no angle falls below its bound."""
+        if not self._keeps_faces(state, trial):
+            return False
+        return float(corner_angles(trial["vertices"], self.topology).min()) > self._smallest_angle

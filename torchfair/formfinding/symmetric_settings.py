@@ -1,0 +1,70 @@
+"""Settings of the design of principal-symmetric meshes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from ..projection import ProjectionSettings
+from .checks import check_choice, check_weights
+
+BOUNDARIES = ("free", "fixed")
+FORMULATIONS = ("spheres", "eliminated", "lifted")
+
+
+def _default_projection() -> ProjectionSettings:
+    return ProjectionSettings(
+        max_iterations=12, initial_damping=1e-3, damping_scale="identity", merit_tolerance=3e-2, patience=2
+    )
+
+
+@dataclass(frozen=True)
+class SymmetricSettings:
+    """What :func:`principal_symmetric` trades against what. Weights are dimensionless: mean edge length 1.
+
+    Attributes:
+        constraint_weight: Weight of the conditions while the shape is found.
+        tight_weight: Their weight once it is found; at last they are met exactly, without any other aim.
+        fairness_weight: Weight of squared umbrella vectors of the displacement from the start of the level: handles
+            pull their surroundings along.
+        handle_weight: Weight of the squared distance of handles from their targets.
+        closeness_weight: Weight of the squared distance from the reference surface, if there is one.
+        energy_weight: Weight of E, the paper's w_target; 0 without.
+        energy_smoothing: ``l l*`` below this is treated as flat.
+        saddle_weight: Weight of the conditions on saddle sides.
+        saddle_margin: How far beyond the bound principal neighbours are pushed, in curvatures of the star's sphere.
+        boundary: ``"free"``, or ``"fixed"`` to keep boundary vertices where they are.
+        smallest_angle: No corner angle falls below this while the shape is found, radians; 0 for no bound.
+        tolerance: Largest relative residual of the conditions at which they count as met.
+        most_steps: Damped steps that one level may take at most.
+        rounds: How often saddle sides that came out wrong are tried again.
+        formulation: ``"spheres"`` has normals and curvatures of the stars' spheres as unknowns beside the vertices,
+            ``"eliminated"`` the vertices alone, ``"lifted"`` the paper's variables.
+        projection: Damping, tolerances and linear solver while the shape is found.
+    """
+
+    constraint_weight: float = 1e2
+    tight_weight: float = 1e4
+    fairness_weight: float = 1.0
+    handle_weight: float = 1e2
+    closeness_weight: float = 1.0
+    energy_weight: float = 0.0
+    energy_smoothing: float = 1e-2
+    saddle_weight: float = 1.0
+    saddle_margin: float = 0.05
+    boundary: str = "free"
+    smallest_angle: float = math.radians(10.0)
+    tolerance: float = 1e-8
+    most_steps: int = 150
+    rounds: int = 4
+    formulation: str = "spheres"
+    projection: ProjectionSettings = field(default_factory=_default_projection)
+
+    def __post_init__(self) -> None:
+        check_choice(self, "boundary", BOUNDARIES)
+        check_choice(self, "formulation", FORMULATIONS)
+        check_weights(self)
+        if not self.constraint_weight > 0.0 or not self.tight_weight > 0.0:
+            raise ValueError("constraint_weight and tight_weight must be above 0")
+        if self.most_steps < 1 or self.rounds < 1:
+            raise ValueError("most_steps and rounds must be at least 1")
