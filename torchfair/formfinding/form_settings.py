@@ -14,7 +14,7 @@ FORMULATIONS = ("reduced", "lifted")
 
 def _default_projection() -> ProjectionSettings:
     return ProjectionSettings(
-        max_iterations=20, initial_damping=1e-2, damping_scale="identity", merit_tolerance=1e-3, patience=2
+        max_iterations=40, initial_damping=1e-2, damping_scale="identity", merit_tolerance=1e-3, patience=2
     )
 
 
@@ -45,7 +45,8 @@ class FormSettings:
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables
             too (for comparison: slower).
         constraint_weight: Weight of the constraints that define auxiliary variables.
-        projection: Iterations of each stage, tolerances, damping and linear solver.
+        projection: Iterations of each stage, tolerances, damping and linear solver. The tolerance of the merit is
+            that of stages in space; along normals ten times it while smoothing is coarse, a tenth of it at last.
     """
 
     curvature_weight: float = 1.0
@@ -58,7 +59,7 @@ class FormSettings:
     corner_angle: float = math.radians(40.0)
     tangent_weight: float = 1e3
     handle_weight: float = 1e4
-    coarse_smoothing: float = 1.5
+    coarse_smoothing: float = 0.3
     smoothing: float = 0.05
     least_angle: float = math.radians(5.0)
     formulation: str = "reduced"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
-from ..projection import ProjectionResult, Status, guided_projection
+from ..projection import ElementTerm, GuidedProjection, ProjectionResult, ProjectionSettings, Status
 from ..projection.iteration import Callback
 from ..projection.layout import State
 from .face_guard import FaceGuard
@@ -17,6 +18,7 @@ Observe = Callable[[Tensor], dict[str, float]]
 Stage = tuple[Tensor, ProjectionResult]
 
 _TANGENT_ROUNDS = 3
+_ROUGHLY, _THOROUGHLY = 10.0, 0.1  # tolerances of stages along normals, over those in space
 
 
 class FormStages:
@@ -29,6 +31,7 @@ class FormStages:
 
     def __init__(self, problem: FormProblem, callback: Callback | None, observe: Observe) -> None:
         self.problem, self.callback, self.observe = problem, callback, observe
+        self._known: dict[str, GuidedProjection] = {}
 
     def from_afar(self, start: Tensor) -> Iterator[Stage]:
         """From any start.
@@ -85,10 +88,10 @@ class FormStages:
         # What tangent planes ask of stars depends on the surface inside: it is seen anew in every stage.
         rounds = _TANGENT_ROUNDS if problem.has_tangent_planes else 0
         for fraction in [*smoothings, *[smoothings[-1]] * rounds]:
-            run = guided_projection(
-                problem.blocks(vertices),
-                problem.terms(vertices, problem.smoothing(vertices, fraction)),
-                fixed={"vertices": problem.fixed},
+            blocks = problem.blocks(vertices)
+            terms = problem.terms(vertices, problem.smoothing(vertices, fraction))
+            run = self._compiled(blocks, terms, {"vertices": problem.fixed}).solve(
+                blocks,
                 settings=problem.settings.projection,
                 callback=self.callback,
                 observe=lambda state: self.observe(state["vertices"]),
@@ -106,6 +109,24 @@ class FormStages:
             if stopped(run):
                 return
 
+    def _compiled(self, blocks: State, terms: Sequence[ElementTerm], fixed: State) -> GuidedProjection:
+        """The problem of one stage: the index maps of the stage before it on the same unknowns are kept."""
+        kind = next(iter(fixed))
+        before, solver = self._known.get(kind), self.problem.settings.projection.solver
+        made = (
+            GuidedProjection(blocks, terms, fixed=fixed, solver=solver) if before is None else before.with_terms(terms)
+        )
+        self._known[kind] = made
+        return made
+
+    def _along_normals_settings(self, fraction: float) -> ProjectionSettings:
+        """Rough where a finer smoothing follows, thorough with the last one, where steps are cheap and safe."""
+        settings = self.problem.settings
+        own = settings.projection
+        if fraction > settings.smoothing:
+            return replace(own, merit_tolerance=_ROUGHLY * own.merit_tolerance, patience=1)
+        return replace(own, merit_tolerance=_THOROUGHLY * own.merit_tolerance)
+
     def _one_along_normals(self, base: Tensor, fraction: float, fairness: float) -> Stage:
         problem = self.problem
         directions = problem.directions(base)
@@ -113,11 +134,11 @@ class FormStages:
         def place(state: State) -> Tensor:
             return base + state["heights"] * directions
 
-        run = guided_projection(
-            {"heights": torch.zeros(base.shape[0], 1, dtype=base.dtype)},
-            problem.height_terms(base, directions, problem.smoothing(base, fraction), fairness),
-            fixed={"heights": problem.topology.is_boundary_vertex | problem.fixed},
-            settings=problem.settings.projection,
+        blocks = {"heights": torch.zeros(base.shape[0], 1, dtype=base.dtype)}
+        terms = problem.height_terms(base, directions, problem.smoothing(base, fraction), fairness)
+        run = self._compiled(blocks, terms, {"heights": problem.topology.is_boundary_vertex | problem.fixed}).solve(
+            blocks,
+            settings=self._along_normals_settings(fraction),
             callback=self.callback,
             observe=lambda state: self.observe(place(state)),
             guard=FaceGuard(problem.topology, place),

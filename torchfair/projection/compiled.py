@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+
 import torch
 
+from ..errors import ShapeError
 from .layout import Layout
 from .term import ElementTerm
 
@@ -29,3 +32,16 @@ class CompiledTerm:
             self.widths += [width] * index.shape[1]
         self.unknowns = torch.cat(unknowns, dim=1).T.contiguous()
         self.nodes = torch.cat(nodes, dim=1).T.contiguous()
+
+    def with_term(self, term: ElementTerm) -> CompiledTerm:
+        """The same numbers for a term on the same stencil."""
+        mine = self.term
+        same = len(term.stencil) == len(mine.stencil) and all(
+            name == other and (index is known or torch.equal(index, known))
+            for (name, index), (other, known) in zip(term.stencil, mine.stencil, strict=True)
+        )
+        if not same or term.linear != mine.linear:
+            raise ShapeError(f"term '{term.name}'", f"the stencil of '{mine.name}', linear like it", "another term")
+        result = copy.copy(self)
+        result.term = term
+        return result

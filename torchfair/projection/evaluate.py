@@ -22,7 +22,7 @@ def residual_table(structure: Structure, terms: Sequence[ElementTerm], at: Evalu
         terms: All its terms, also those without elements or weight.
         at: A state whose residuals are known.
     """
-    known = {id(c.term): pair for c, *pair in zip(structure.compiled, at.arguments, at.values, strict=True)}
+    known = {id(c.term): (a, v) for c, a, v in zip(structure.compiled, at.arguments, at.values, strict=True)}
     groups: dict[str, list[ElementTerm]] = {}
     for term in terms:
         groups.setdefault(term.name, []).append(term)

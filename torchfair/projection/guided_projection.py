@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 
 import torch
@@ -11,6 +12,7 @@ from ..errors import ShapeError
 from .iteration import Callback, Guard, Iteration, Observe
 from .layout import Layout, State
 from .linear import LinearSolver, choose_solver
+from .linear.direct import SparseDirect
 from .result import ProjectionResult
 from .settings import ProjectionSettings
 from .system import Structure
@@ -87,6 +89,23 @@ class GuidedProjection:
         self.structure = Structure(self.layout, self.terms, free, first.dtype)
         self.solver = choose_solver(solver, self.structure) if isinstance(solver, str) else solver
         self._prepared = False
+
+    def with_terms(self, terms: Sequence[ElementTerm]) -> GuidedProjection:
+        """The same problem with other data, weights and losses of its terms; index maps and analysis are kept.
+
+        Args:
+            terms: On the same stencils as those before, in the same order.
+
+        Raises:
+            ShapeError: stencils differ, or other terms have elements and a weight.
+        """
+        result = copy.copy(self)
+        result.terms = list(terms)
+        result.structure = self.structure.with_terms(terms)
+        kept = isinstance(self.solver, SparseDirect) and result.structure.shares_pattern(self.structure)
+        result._prepared = self._prepared and kept
+        result.solver = self.solver if kept else copy.copy(self.solver)
+        return result
 
     def solve(
         self,

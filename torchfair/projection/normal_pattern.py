@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Sequence
 from functools import cached_property
@@ -130,6 +131,29 @@ class NormalPattern:
         i, j = lower.row - self._first[rows], lower.col - self._first[columns]
         values[_place(self._start[pairs], self._stride[pairs], i, j)] = lower.data
         return torch.from_numpy(values)
+
+    def fits(self, affine: AffinePart | None) -> bool:
+        """Whether the constant matrix of these linear terms has its place in the pattern."""
+        if affine is None:
+            return True
+        keys = self._keys(affine.normal_matrix.tocoo())
+        places = np.searchsorted(self._pair_keys, keys).clip(max=self._pair_keys.size - 1)
+        return bool((self._pair_keys[places] == keys).all())
+
+    def _keys(self, matrix: sp.coo_matrix) -> Ints:
+        """Keys of the pairs of nodes of the lower triangle of a matrix between unknowns."""
+        owner = np.repeat(np.arange(self._widths.size), self._widths)
+        lower = matrix.row >= matrix.col
+        keys: Ints = owner[matrix.col[lower]] * self._widths.size + owner[matrix.row[lower]]
+        return keys
+
+    def with_constant(self, affine: AffinePart | None) -> NormalPattern:
+        """The same pattern with other linear terms, which must fit."""
+        result = copy.copy(self)
+        result._constant = None
+        if affine is not None:
+            result._constant = self._place_constant(sp.tril(affine.normal_matrix, format="coo")).to(self._like)
+        return result
 
     def assemble(self, jacobians: Sequence[Tensor]) -> Tensor:
         """(nnz,) values of the lower triangle for element Jacobians ``(m, K, n)`` of the terms."""

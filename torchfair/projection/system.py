@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -9,6 +10,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from ..errors import ShapeError
 from .affine import AffinePart
 from .block_diagonal import BlockDiagonal
 from .compiled import CompiledTerm
@@ -48,16 +50,45 @@ class Structure:
     """
 
     def __init__(self, layout: Layout, terms: Sequence[ElementTerm], free: Tensor, dtype: torch.dtype) -> None:
-        for term in terms:
-            term.check(layout)
         self.layout, self.free = layout, free
-        self.terms = [term for term in terms if term.num_elements and term.weight > 0.0]
-        compiled = [CompiledTerm(term, layout) for term in self.terms]
-        self.compiled = [c for c in compiled if not c.term.linear]
-        linear = [c for c in compiled if c.term.linear]
-        self.affine = AffinePart(linear, layout, free, dtype) if linear else None
+        self._take([CompiledTerm(term, layout) for term in self._checked(terms)], dtype)
         self._like = torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device)
         self._free = [None if bool(free.all()) else free[c.unknowns] for c in self.compiled]
+
+    def _checked(self, terms: Sequence[ElementTerm]) -> list[ElementTerm]:
+        for term in terms:
+            term.check(self.layout)
+        return [term for term in terms if term.num_elements and term.weight > 0.0]
+
+    def _take(self, compiled: list[CompiledTerm], dtype: torch.dtype) -> None:
+        self.terms = [c.term for c in compiled]
+        self.compiled = [c for c in compiled if not c.term.linear]
+        self._linear = [c for c in compiled if c.term.linear]
+        self.affine = AffinePart(self._linear, self.layout, self.free, dtype) if self._linear else None
+
+    def with_terms(self, terms: Sequence[ElementTerm]) -> Structure:
+        """The structure of terms on the same stencils with other data, weights and losses; index maps are kept.
+
+        Raises:
+            ShapeError: a term that has elements and a weight was not there before, is missing, or has another stencil.
+        """
+        chosen, known = self._checked(terms), {id(c.term): c for c in [*self.compiled, *self._linear]}
+        if len(chosen) != len(self.terms):
+            raise ShapeError("terms", f"{len(self.terms)} with elements and a weight", len(chosen))
+        compiled = [known[id(before)].with_term(term) for before, term in zip(self.terms, chosen, strict=True)]
+        result = copy.copy(self)
+        for stale in ("normal_pattern", "block_diagonal", "_outputs"):
+            result.__dict__.pop(stale, None)
+        result._take(compiled, self._like.dtype)
+        pattern = self.__dict__.get("normal_pattern")
+        if pattern is not None and pattern.fits(result.affine):
+            result.__dict__["normal_pattern"] = pattern.with_constant(result.affine)
+        return result
+
+    def shares_pattern(self, other: Structure) -> bool:
+        """Whether the normal matrices of both are filled in the same places; False unless known."""
+        mine, theirs = (structure.__dict__.get("normal_pattern") for structure in (self, other))
+        return mine is not None and theirs is not None and mine.rows is theirs.rows
 
     @property
     def num_unknowns(self) -> int:

@@ -14,7 +14,8 @@ from ..system import Structure
 from .direct import SparseDirect, Substitution
 
 _ROUGHEST = 1e-9  # relative remainder of every step, so that results do not depend on how sums are rounded
-_REFINEMENTS = 3
+_REFINEMENTS = 8
+_LEAST_PROGRESS = 0.1  # of a refinement that is worth another one
 
 
 class RslabDirect(SparseDirect):
@@ -90,10 +91,14 @@ class RslabDirect(SparseDirect):
         """Solution by a factor in single precision; None if it stays inaccurate."""
         lower, diagonal = self._lower(values), values[self._pattern.offsets[:-1]]
         solution: np.ndarray = np.zeros_like(right)
-        remainder = right
+        remainder, target = right, accuracy * np.linalg.norm(right)
         for _ in range(1 + _REFINEMENTS):
+            before = np.linalg.norm(remainder)
             solution = solution + factor.solve(remainder)
             remainder = right - (lower @ solution + lower.T @ solution - diagonal * solution)
-            if np.linalg.norm(remainder) <= accuracy * np.linalg.norm(right):
+            size = np.linalg.norm(remainder)
+            if size <= target:
                 return solution
+            if not size <= _LEAST_PROGRESS * before:
+                return None
         return None
