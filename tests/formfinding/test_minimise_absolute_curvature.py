@@ -169,6 +169,29 @@ def test_handles_are_reached_and_kept_through_refinement() -> None:
     )
 
 
+def test_handles_on_a_boundary_that_stays_are_refused() -> None:
+    vertices, topology = start_surface([ring(1.0, 0.0)], 60)
+    on_rim = topology.boundary_loops()[0].tolist()
+    away = {on_rim[0]: [0.0, 0.0, 1.0], on_rim[3]: [0.0, 0.0, 2.0], 0: [0.0, 0.0, 0.1]}
+    with pytest.raises(MeshError, match=f"2 handles.*{on_rim[0]}, {on_rim[3]}.*glide"):
+        minimise_absolute_curvature(vertices, topology, handles=away)
+    square = ClosedCurve(torch.tensor([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]).double())
+    start, disk = start_surface([square], 60)
+    pulled = {int(start.norm(dim=1).argmin()): [0.0, 0.0, 1.0]}
+    glide = FormSettings(boundary="glide")
+    with pytest.raises(MeshError, match="corners stay"):  # even if the boundary glides
+        minimise_absolute_curvature(start, disk, curves=[square], handles=pulled, settings=glide)
+    # Where they already are there is nothing to refuse.
+    place = {on_rim[0]: vertices[on_rim[0]].tolist()}
+    result = minimise_absolute_curvature(vertices, topology, handles=place)
+    assert result.after["largest_handle_distance"] == 0.0
+    # A gliding boundary is pulled along its curve.
+    along = (math.cos(0.05), math.sin(0.05), 0.0)
+    nearest = int((vertices - torch.tensor(along).double()).norm(dim=1).argmin())
+    slid = minimise_absolute_curvature(vertices, topology, handles={nearest: along}, settings=glide)
+    assert slid.after["largest_handle_distance"] < 0.2 * slid.before["largest_handle_distance"]
+
+
 def test_gliding_boundaries_stay_on_their_curves() -> None:
     curve = wave()
     vertices, topology = start_surface([curve], 250)

@@ -19,11 +19,11 @@ from ..topology import Topology
 from ..triangulation import triangulate
 from .boundary_track import BoundaryTrack, new_boundary_vertices
 from .checks import one_start, refuse_degenerate_faces
-from .form_problem import FormProblem
+from .form_problem import FormProblem, staying_vertices
 from .form_report import form_measures
 from .form_settings import FormSettings
 from .form_stages import FormStages, stopped
-from .handles import read_handles
+from .handles import read_handles, refuse_unreachable_handles
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def minimise_absolute_curvature(
     Raises:
         ShapeError: vertices or normals are not ``(V, 3)``, or a handle is not a point.
         MeshError: vertices are not finite, a face has no area, curves do not fit the boundary, or a handle is
-            no vertex.
+            no vertex or pulls a vertex of the boundary that stays.
     """
     settings = settings or FormSettings()
     start, topology = one_start(vertices, topology), topology.to("cpu")
@@ -109,6 +109,7 @@ def minimise_absolute_curvature(
     else:
         track = BoundaryTrack.onto(start, topology, curves)
     current = track.positions(start)
+    refuse_unreachable_handles(pulled, targets, current, staying_vertices(topology, track, settings))
     before = form_measures(start, topology, normals, pulled, targets)
     if not topology.is_triangular:
         notes.append("faces with more than three corners are cut into triangles while C is lowered")

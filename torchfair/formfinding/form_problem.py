@@ -57,8 +57,7 @@ class FormProblem:
         self.topology, self.settings = topology, settings
         self.handles, self.targets = handles, targets
         gliding = settings.boundary == "glide"
-        stays = topology.is_boundary_vertex & (track.corners | (not gliding))
-        self.fixed = stays | (topology.valences == 0)
+        self.fixed = staying_vertices(topology, track, settings)
         self.normals = normals
         self._conditions = c.handle_terms(handles, targets, weight=settings.handle_weight)
         if settings.umbrella_weight:
@@ -177,3 +176,9 @@ class FormProblem:
             *c.gliding_terms(curves, vertices, track.pieces(vertices), weight=settings.boundary_weight),
             *c.boundary_fairness_terms(self.topology, track.corners, weight=settings.fairness_weight),
         ]
+
+
+def staying_vertices(topology: Topology, track: BoundaryTrack, settings: FormSettings) -> Tensor:
+    """(V,) bool, vertices that do not move: the boundary or, where that glides, its corners; isolated ones."""
+    gliding = settings.boundary == "glide"
+    return topology.is_boundary_vertex & (track.corners | (not gliding)) | (topology.valences == 0)

@@ -10,6 +10,8 @@ from torch import Tensor
 from ..errors import MeshError, ShapeError
 from ..topology import Topology
 
+_SAME_PLACE = 1e-9  # of the extent of the mesh
+
 
 def read_handles(handles: Mapping[int, Sequence[float]], topology: Topology) -> tuple[Tensor, Tensor]:
     """Vertex numbers (n,) and targets (n, 3) float64.
@@ -27,3 +29,27 @@ def read_handles(handles: Mapping[int, Sequence[float]], topology: Topology) -> 
             raise MeshError(f"handle {vertex} is no vertex: numbers run from 0 to {topology.num_vertices - 1}")
         targets[row] = point
     return torch.tensor(list(handles), dtype=torch.int64), targets
+
+
+def refuse_unreachable_handles(handles: Tensor, targets: Tensor, vertices: Tensor, stays: Tensor) -> None:
+    """Handles on vertices that stay where they are, at other places than their targets.
+
+    Args:
+        handles: (n,) from :func:`read_handles`.
+        targets: (n, 3) likewise.
+        vertices: (V, 3) float64 start.
+        stays: (V,) bool, vertices that do not move.
+
+    Raises:
+        MeshError: there are such handles.
+    """
+    places = vertices[handles]
+    extent = (vertices.amax(0) - vertices.amin(0)).max()
+    away = torch.linalg.vector_norm(places - targets, dim=1) > _SAME_PLACE * extent
+    bad = handles[stays[handles] & away].tolist()
+    if bad:
+        raise MeshError(
+            f"{len(bad)} handles cannot be reached, first {bad[:5]}: these vertices lie on the boundary, which stays "
+            "where it is. Lead the boundary curve through the targets, leave these handles out, or let the boundary "
+            "glide (its corners stay even so)"
+        )
