@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
+
+from .runs import expand_counts, run_chunks
 
 _CHUNK = 1 << 17  # pixels handed out at a time on a CPU: keeps every temporary inside the cache
 
@@ -53,22 +54,7 @@ def triangle_spans(points: Tensor, triangles: Tensor, width: int, height: int) -
 
 def span_chunks(spans: Spans) -> Iterator[tuple[Tensor, Tensor]]:
     """Every covered pixel once, in chunks ``(span number, pixels after the start of the span)``."""
-    ends = spans.length.cumsum(0)
-    total = int(ends[-1]) if ends.shape[0] else 0
-    size = _CHUNK if ends.device.type == "cpu" else max(total, 1)
-    marks = torch.arange(size, max(total, size), size, device=ends.device)
-    cuts = torch.searchsorted(ends, marks).tolist()
-    for begin, end in itertools.pairwise([0, *cuts, ends.shape[0]]):
-        if end > begin:
-            span, offset = expand_counts(spans.length[begin:end])
-            yield span + begin, offset
-
-
-def expand_counts(counts: Tensor) -> tuple[Tensor, Tensor]:
-    """Item number and position within the item, for every unit of ``counts``."""
-    item = torch.repeat_interleave(counts)
-    begin = counts.cumsum(0) - counts
-    return item, torch.arange(item.shape[0], device=counts.device) - begin.index_select(0, item)
+    return run_chunks(torch.zeros_like(spans.length), spans.length, _CHUNK)
 
 
 def _first_centre(coordinate: Tensor, size: int) -> Tensor:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from .scan import expand_counts
+from .runs import expand_counts
 
 
 class Segments(NamedTuple):
@@ -37,22 +37,31 @@ def pixel_segments(ends: Tensor, pictures: Tensor, width: int, height: int) -> S
     """
     origin, along = ends[:, 0], ends[:, 1] - ends[:, 0]
     begin, end = _on_screen(origin, along, ends.new_tensor([width, height]))
-    cuts = [_crossings(origin[:, axis], along[:, axis], begin, end) for axis in (0, 1)]
-    numbers = torch.arange(ends.shape[0], device=ends.device)[end > begin]
-    edge = torch.cat([numbers, *(cut[0] for cut in cuts)])
-    start = torch.cat([begin[numbers], *(cut[1] for cut in cuts)])
-    # Positions lie in 0..1 and edges are numbered: their sum orders both (to 1e-16 times the number of edges).
-    order = (edge + 0.5 * start).argsort()
-    edge, start = edge[order], start[order]
-    last = torch.ones_like(edge, dtype=torch.bool)
-    last[:-1] = edge[1:] != edge[:-1]
-    stop = torch.where(last, end.index_select(0, edge), start.roll(-1))
-    stop = torch.maximum(start, stop)
+    (columns, left), (rows, upper) = (_crossings(origin[:, axis], along[:, axis], begin, end) for axis in (0, 1))
+    edge, start, stop = cut_items(begin, end, torch.cat([columns, rows]), torch.cat([left, upper]))
     middle = origin.index_select(0, edge) + ((start + stop) / 2)[:, None] * along.index_select(0, edge)
     column = middle[:, 0].floor().clamp(0, width - 1).to(torch.int64)
     row = middle[:, 1].floor().clamp(0, height - 1).to(torch.int64)
-    pixel, order = ((pictures.index_select(0, edge) * height + row) * width + column).sort()
+    pixel, order = ((pictures.index_select(0, edge) * height + row) * width + column).sort(stable=True)
     return Segments(edge[order], pixel, start[order], stop[order])
+
+
+def cut_items(begin: Tensor, end: Tensor, item: Tensor, place: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Cuts intervals ``begin .. end`` (n,) at places (c,) of items (c,): item, begin and end of the pieces, in order.
+
+    Items whose interval is empty are left out.
+    """
+    filled = torch.nonzero(end > begin).squeeze(1)
+    number = torch.cat([filled, item])
+    start = torch.cat([begin.index_select(0, filled), place])
+    size = end - begin
+    # Relative positions lie in 0..1: half of them beside the number of the item orders both at once.
+    order = (number + 0.5 * (start - begin.index_select(0, number)) / size.index_select(0, number)).argsort(stable=True)
+    number, start = number.index_select(0, order), start.index_select(0, order)
+    last = torch.ones_like(number, dtype=torch.bool)
+    last[:-1] = number[1:] != number[:-1]
+    stop = torch.where(last, end.index_select(0, number), start.roll(-1))
+    return number, start, torch.maximum(start, stop)
 
 
 def _on_screen(origin: Tensor, along: Tensor, size: Tensor) -> tuple[Tensor, Tensor]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -10,14 +9,13 @@ import torch
 from torch import Tensor
 
 from .rasterise import depth_levels, unpack_nearest
-from .scan import expand_counts
+from .runs import run_chunks
 from .segments import Segments
 from .touch import TouchedSpans, touched_spans
 
-STEP = 1e-3
+STEP = 1e-5
 """Pixels from an edge to the places on its sides."""
 
-_CHUNK = 1 << 15  # tests worked on at a time on a CPU: keeps every temporary inside the cache
 _FAR = torch.iinfo(torch.int64).max
 
 
@@ -104,18 +102,7 @@ def _meetings(
     first = torch.nn.functional.pad(counts.cumsum(0), (1, 0))  # place that each pixel begins with
     row = (pictures.index_select(0, spans.triangle) * height + spans.row) * width
     begin = first.index_select(0, row + spans.start)
-    number = first.index_select(0, row + spans.stop) - begin
-    chosen = torch.nonzero(number).squeeze(1)
-    begin, number = begin.index_select(0, chosen), number.index_select(0, chosen)
-    ends = number.cumsum(0)
-    total = int(ends[-1]) if ends.shape[0] else 0
-    size = _CHUNK if pixel.device.type == "cpu" else max(total, 1)
-    marks = torch.arange(size, max(total, size), size, device=pixel.device)
-    cuts = [0, *torch.searchsorted(ends, marks).tolist(), ends.shape[0]]
-    for low, high in itertools.pairwise(cuts):
-        if high > low:
-            item, offset = expand_counts(number[low:high])
-            yield chosen[low:high].index_select(0, item), begin[low:high].index_select(0, item) + offset
+    return run_chunks(begin, first.index_select(0, row + spans.stop) - begin)
 
 
 def _keys(tables: Tables, triangle: Tensor, places: Places, place: Tensor) -> Tensor:

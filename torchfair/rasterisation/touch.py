@@ -7,7 +7,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from .scan import expand_counts
+from .runs import expand_counts
 
 _MARGIN = 1e-2  # pixels by which triangles are enlarged
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from ..rasterisation.crossings import cut_at_crossings
 from ..rasterisation.segments import Segments, pixel_segments
 from ..rasterisation.sides import seen_beside
 from ._scene import Scene
@@ -36,8 +37,9 @@ def edge_terms(
     points = scene.points.detach().to(torch.float64)
     ends = points[scene.edges][..., :2]
     segments = pixel_segments(ends, scene.edge_pictures, width, height)
+    segments = cut_at_crossings(segments, ends, _outline(scene), scene.num_pictures * height * width)
     sides = seen_beside(points[scene.triangles], scene.pictures, segments, ends, (scene.num_pictures, height, width))
-    own = _own(scene, segments, sides, smooth)
+    own = _own(scene, segments, sides)
     segments, sides = Segments(*(part.index_select(0, own) for part in segments)), sides.index_select(0, own)
 
     start, along = ends[segments.edge, 0], (ends[:, 1] - ends[:, 0])[segments.edge]
@@ -53,7 +55,8 @@ def edge_terms(
     tail, head = (scene.points[:, :2].index_select(0, scene.edges[segments.edge, k]) for k in (0, 1))
     moved = torch.lerp(tail, head, position.to(tail))
     motion = (across.to(moved) * (moved - moved.detach())).sum(-1, keepdim=True)
-    return segments.pixel, corrections - motion * jump.detach()
+    shares = scene.edge_shares.index_select(0, segments.edge)[:, None].to(jump)
+    return segments.pixel, shares * (corrections - motion * jump.detach())
 
 
 def _centres(pixel: Tensor, width: int, height: int) -> Tensor:
@@ -61,13 +64,27 @@ def _centres(pixel: Tensor, width: int, height: int) -> Tensor:
     return torch.stack([column, torch.remainder(row, height)], dim=-1) + 0.5
 
 
-def _own(scene: Scene, segments: Segments, sides: Tensor, smooth: bool) -> Tensor:
+def _outline(scene: Scene) -> Tensor:
+    """(E,) mask of the edges where the surface ends or turns away, and perhaps of some others."""
+    a, b, c = scene.points.detach()[:, :2][scene.triangles].unbind(1)
+    u, v = b - a, c - a
+    facing = torch.sign(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    count = int(scene.faces.amax()) + 1 if scene.faces.shape[0] else 0
+    face = scene.pictures * count + scene.faces
+    sides = facing.new_full((2, scene.num_pictures * count), 2)
+    sides[0].scatter_reduce_(0, face, facing, "amin")
+    sides[1].scatter_reduce_(0, face, facing.neg(), "amin")
+    beside = scene.edge_pictures[:, None] * count + scene.edge_faces
+    first, second = sides[:, beside].unbind(-1)
+    alone = scene.edge_faces[:, 0] == scene.edge_faces[:, 1]
+    return alone | (first != second).any(0) | (first[0] != -first[1])
+
+
+def _own(scene: Scene, segments: Segments, sides: Tensor) -> Tensor:
     """Numbers of the segments of edges that are seen, and part what is seen on their sides."""
     faces = torch.cat([scene.faces, scene.faces.new_tensor([-1])])[sides]
     beside = (faces[:, :, None] == scene.edge_faces.index_select(0, segments.edge)[:, None]).any(-1)
     parting = beside.any(1) & (faces[:, 0] != faces[:, 1])
-    if smooth:
-        parting = parting & ~beside.all(1)  # the same colour on both sides
     return torch.nonzero(parting).squeeze(1)
 
 

@@ -11,6 +11,7 @@ from ..geometry._ops import cross, dot
 from ..topology import Topology
 from ..triangulation import triangulate
 from ._clip import clip_edges, clip_triangles
+from ._seams import edge_faces
 from .camera import Camera, Size
 
 
@@ -31,6 +32,7 @@ class Scene:
         edges: (E, 2) points: the edges of the mesh, and cuts through polygons along which they fold on the screen.
         edge_faces: (E, 2) faces beside each edge, one of them twice where there is no other.
         edge_pictures: (E,) picture of each edge.
+        edge_shares: (E,) 1, or less where edges of separate parts lie upon each other.
     """
 
     num_meshes: int
@@ -45,6 +47,7 @@ class Scene:
     edges: Tensor
     edge_faces: Tensor
     edge_pictures: Tensor
+    edge_shares: Tensor
 
     @property
     def num_pictures(self) -> int:
@@ -69,10 +72,11 @@ def build_scene(vertices: Tensor, topology: Topology, camera: Camera, size: Size
     first = (pictures * count)[:, None, None]
     triangles = cut.triangles.repeat_interleave(views, 0) + first
     folds, fold_faces, fold_pictures = _folds(local.detach(), triangles, cut.faces, camera)
-    sides, side_faces = topology.edges, _edge_faces(topology)
-    edges = torch.cat([(sides + first).view(-1, 2), folds])
-    edge_faces = torch.cat([side_faces.repeat(meshes * views, 1), fold_faces])
-    edge_pictures = torch.cat([pictures.repeat_interleave(sides.shape[0]), fold_pictures])
+    beside, shares = (part.repeat_interleave(views, 0).flatten(0, 1) for part in edge_faces(vertices, topology))
+    edges = torch.cat([(topology.edges + first).view(-1, 2), folds])
+    beside = torch.cat([beside, fold_faces])
+    edge_pictures = torch.cat([pictures.repeat_interleave(topology.num_edges), fold_pictures])
+    shares = torch.cat([shares, shares.new_ones(folds.shape[0])])
     faces, triangle_pictures = cut.faces.repeat(meshes * views), pictures.repeat_interleave(cut.faces.shape[0])
     triangles = triangles.view(-1, 3)
 
@@ -84,7 +88,8 @@ def build_scene(vertices: Tensor, topology: Topology, camera: Camera, size: Size
             left = clip_triangles(triangles, distance, local.shape[0])
             kept = clip_edges(edges, distance, local.shape[0] + left.blends.shape[0])
             triangles, faces, triangle_pictures = left.items, faces[left.source], triangle_pictures[left.source]
-            edges, edge_faces, edge_pictures = kept.items, edge_faces[kept.source], edge_pictures[kept.source]
+            edges, beside, edge_pictures = kept.items, beside[kept.source], edge_pictures[kept.source]
+            shares = shares[kept.source]
             blends, weights = torch.cat([left.blends, kept.blends]), torch.cat([left.weights, kept.weights])
             # Points that were cut away are no longer used; a place in front of the eye keeps their derivatives finite.
             behind = torch.cat([distance <= 0, torch.zeros_like(weights, dtype=torch.bool)])[:, None]
@@ -93,7 +98,7 @@ def build_scene(vertices: Tensor, topology: Topology, camera: Camera, size: Size
     points = camera.to_screen(local, size, view)
     return Scene(
         meshes, views, points, vertex, blends, weights,
-        triangles, faces, triangle_pictures, edges, edge_faces, edge_pictures,
+        triangles, faces, triangle_pictures, edges, beside, edge_pictures, shares,
     )  # fmt: skip
 
 
@@ -103,14 +108,6 @@ def _extended(values: Tensor, blends: Tensor, weights: Tensor) -> Tensor:
         return values
     first, second = values.index_select(0, blends[:, 0]), values.index_select(0, blends[:, 1])
     return torch.cat([values, torch.lerp(first, second, weights.to(values)[:, None])])
-
-
-def _edge_faces(topology: Topology) -> Tensor:
-    """(E, 2) faces beside each edge; on the boundary the only one twice."""
-    face = torch.zeros_like(topology.edges[:, 0])
-    face[topology.corner_edges] = topology.corner_faces
-    boundary = face[topology.num_interior_edges :, None].expand(-1, 2)
-    return torch.cat([topology.interior_edge_faces, boundary])
 
 
 def _folds(local: Tensor, triangles: Tensor, faces: Tensor, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:

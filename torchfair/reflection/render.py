@@ -63,16 +63,16 @@ def render_reflection(
 
     **Pixels.** Samples are taken at the centres of ``supersampling``^2 squares in each pixel and averaged.
     With ``antialias`` each of these squares shows the mean over the faces in it instead, weighted by the exact areas
-    that they cover (but for faces that penetrate each other, and for the square in which an edge passes behind
-    another face); for a face its colour at the centre of the square counts.
+    that they cover, hidden parts cut away: exact to 1e-7 but where faces penetrate each other. For a face its colour
+    at the centre of the square counts.
 
     **Gradients** with respect to vertices, normals and parameters of the environment are those of the image with
     ``antialias``, whether it is asked for or not: exact derivatives of areas and colours, which follow the motion of
     every edge, inside the mesh, on its outline and where one part hides another. So the gradient without
     ``antialias`` is not that of the sampled image, which jumps as edges pass samples, but of the one it samples. It is
     finite everywhere, in reverse and forward mode. Lines along which faces penetrate each other move without
-    contributing, and edges that two separate parts have in common, without being one edge of the topology, contribute
-    twice. In functions compiled by ``torch.compile`` pictures are left to eager mode (a graph break).
+    contributing. Boundary edges with equal ends count as one edge. In functions compiled by ``torch.compile``
+    pictures are left to eager mode (a graph break).
 
     Args:
         vertices: positions (*batch, V, 3), finite.
