@@ -36,6 +36,7 @@ class Config(ExperimentConfig):
 
     rows: int = setting(52, "square root of the number of vertices, about", least=6)
     frequency: float = setting(3.5, "stripe pairs per unit of the mirrored direction", least=0.1)
+    size: int = setting(256, "pixels along the pictures that are scored", least=32)
     joints: float = setting(0.35, "opacity of the joints between panels", least=0.0)
     width: int = setting(2600, "columns of pixels of the picture", least=300)
 
@@ -43,7 +44,7 @@ class Config(ExperimentConfig):
 def experiment(config: Config, results: Results) -> Report:
     """Meshes, measures, draws."""
     reference = SmoothReference.of_surface(SURFACE)
-    setup = ReflectionSetup.for_reference(reference)
+    setup = ReflectionSetup.for_reference(reference, size=config.size)
     meshes = {name: layout(SURFACE, kind, config.rows, config.seed) for name, kind in PANELS.items()}
     report: dict[str, Report] = {}
     for name, mesh in meshes.items():

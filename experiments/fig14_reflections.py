@@ -35,6 +35,7 @@ class Config(ExperimentConfig):
 
     rows: tuple[int, ...] = setting((24, 48), "square roots of the numbers of vertices, about", least=6)
     frequency: float = setting(2.0, "stripe pairs per unit of the mirrored direction", least=0.1)
+    size: int = setting(256, "pixels along the pictures that are scored", least=32)
     joints: float = setting(0.35, "opacity of the joints between panels", least=0.0)
     width: int = setting(2600, "columns of pixels of the picture", least=300)
 
@@ -48,7 +49,7 @@ def files(config: Config | None = None) -> list[str]:
 def experiment(config: Config, results: Results) -> Report:
     """Meshes, measures, draws."""
     reference = SmoothReference.of_surface(SURFACE)
-    setup = ReflectionSetup.for_reference(reference)
+    setup = ReflectionSetup.for_reference(reference, size=config.size)
     names = iter(files(config))
     report: dict[str, dict[str, Report]] = {name: {} for name in PANELS}
     mirrors: list[list[Mirror]] = []

@@ -72,6 +72,7 @@ def measure(name: str, rows: int, setup: ReflectionSetup, config: Config) -> tup
             "vertices": mesh.topology.num_vertices,
             "score": score.score,
             "score_by_view": score.per_view.mean(-1),
+            "score_by_view_and_stripes": score.per_view,
             "reflection_variation": score.reflection_variation,
             "rms": score.rms,
             "wobble": score.wobble,
@@ -81,10 +82,15 @@ def measure(name: str, rows: int, setup: ReflectionSetup, config: Config) -> tup
 
 
 def wins(cases: list[Report], first: str, second: str) -> dict[str, float]:
-    """In which part of the cases ``first`` looks smoother than ``second``, by view and by the mean of the views."""
-    views = torch.cat([case[first]["score_by_view"] < case[second]["score_by_view"] for case in cases])
-    means = torch.stack([case[first]["score"] < case[second]["score"] for case in cases])
-    rates = {"views": float(views.double().mean()), "means": float(means.double().mean())}
+    """In which part of the cases ``first`` looks smoother than ``second``.
+
+    By the score of single views and of their mean, and in single views by single stripe directions.
+    """
+    keys = {"views": "score_by_view", "means": "score", "single_stripes": "score_by_view_and_stripes"}
+    rates = {
+        name: float(torch.stack([case[first][key] < case[second][key] for case in cases]).double().mean())
+        for name, key in keys.items()
+    }
     for quantity in QUANTITIES[1:]:
         rates[quantity] = float(np.mean([float(c[first][quantity]) < float(c[second][quantity]) for c in cases]))
     return rates
@@ -104,8 +110,9 @@ def correlations(cases: list[Report]) -> dict[str, dict[str, float]]:
 
 def table(pairs: dict[str, dict[str, float]], correlation: dict[str, dict[str, float]]) -> str:
     """Win rates and correlations as text."""
-    columns = ("views", "means", *QUANTITIES[1:])
-    lines = ["how often the first layout is better than the second (by score in single views, by score, by ...)"]
+    columns = ("views", "means", "single_stripes", *QUANTITIES[1:])
+    lines = ["how often the first layout is better than the second (by score in single views; by their mean; in single",
+             "views by a single stripe direction; by ...)"]  # fmt: skip
     lines.append(f"{'':<72}" + "".join(f"{name.replace('_', ' '):>22}" for name in columns))
     lines += [f"{pair:<72}" + "".join(f"{rates[name]:>22.3f}" for name in columns) for pair, rates in pairs.items()]
     lines += ["", "rank correlation over the layouts (median and smallest over surfaces and densities)"]

@@ -54,6 +54,7 @@ class Config(ExperimentConfig):
     rate: float = setting(0.02, "learning rate, in edge lengths", least=1e-6)
     weight: float = setting(0.1, "weight of the variation", least=0)
     size: int = setting(128, "pixels along a picture while optimising", least=32)
+    judged_size: int = setting(256, "pixels along the pictures by which meshes are judged", least=32)
     every: int = setting(10, "steps between measurements", least=1)
 
 
@@ -134,7 +135,7 @@ def optimise(
 def run_surface(name: str, config: Config) -> tuple[dict[str, Report], dict[str, Tensor], SmoothReference, ShapeMesh]:
     """All losses on one surface: figures and positions by loss."""
     reference = SmoothReference.of_surface(SADDLES[name])
-    setup = ReflectionSetup.for_reference(reference)
+    setup = ReflectionSetup.for_reference(reference, size=config.judged_size)
     others = other_views(setup)
     mesh = layout(SADDLES[name], IRREGULAR, config.rows, config.seed)
     both = ReflectionLoss(mesh.topology, setup, variation_weight=config.weight, size=config.size)

@@ -231,6 +231,45 @@ def test_saddle_term_removes_bad_saddles_near_the_surface(run: Run) -> None:
     assert repaired["largest_distance"] < 0.05
 
 
+def test_reflections_rank_principal_meshes_first_and_variation_is_energy(run: Run) -> None:
+    report = run("fig_reflection_ranking", "--surfaces", "paraboloid", "--rows", "20", "--size", "96")
+    principal = ("principal quads", "principal-symmetric, base = height", "principal-symmetric, equilateral")
+    others = ("split squares, turned 25°", "split squares, turned 45°", "irregular", "irregular, another seed")
+    rates = [report["pairs"][f"{good} < {bad}"] for good in principal for bad in others]
+    assert all(rate["means"] == 1 for rate in rates)
+    assert report["smallest_rate_of_principal_meshes"] == min(rate["views"] for rate in rates) >= 0.8
+    assert min(rate["single_stripes"] for rate in rates) < min(rate["views"] for rate in rates)
+    assert report["correlations"]["reflection_variation, energy_per_area"]["smallest"] > 0.95
+    assert report["cases"] == 6
+
+
+def test_vertices_slide_until_reflections_are_smoother_without_folding(run: Run, tmp_path: Path) -> None:
+    options = ("--surfaces", "paraboloid", "--rows", "9", "--steps", "12", "--every", "12", "--rate", "0.03",
+               "--size", "64", "--judged-size", "64")  # fmt: skip
+    losses = run("optimise_reflection", *options)["surfaces"]["paraboloid"]
+    both, energy = losses["1 - SSIM and variation"], losses["E alone"]
+    assert both["score_change"] < -0.08
+    assert both["score_change"] < energy["score_change"]
+    assert both["normal_variation_change"] < 0
+    assert both["end"]["flipped_faces"] == 0
+    start, end = (load_mesh(tmp_path / "out" / name) for name in ("start.obj", "reflection.obj"))
+    boundary = start.topology.is_boundary_vertex
+    assert torch.equal(start.vertices[boundary], end.vertices[boundary])
+    x, y, z = end.vertices.unbind(1)
+    assert (z - 0.5 * x**2 + 0.25 * y**2).abs().max() < 1e-9  # still on the surface
+
+
+@pytest.mark.parametrize(("name", "rows"), [("fig01_reflections", ["16"]), ("fig14_reflections", ["10", "16"])])
+def test_principal_meshes_have_least_energy_and_mirror_better(run: Run, name: str, rows: list[str]) -> None:
+    report = run(name, "--size", "96", "--rows", *rows)
+    finest = {kind: row.get(rows[-1], row) for kind, row in report["meshes"].items()}
+    kinds = ("triangle mesh", "principal-symmetric triangles", "principal quads")
+    irregular, symmetric, quads = (finest[kind] for kind in kinds)
+    assert quads["normal_variation"] < symmetric["normal_variation"] < irregular["normal_variation"]
+    assert quads["normal_variation"] == pytest.approx(report["total_absolute_curvature"], rel=0.15)
+    assert max(quads["score"], symmetric["score"]) < irregular["score"]
+
+
 TRAINING = ("--rows", "8", "--columns", "8", "--points", "120", "--batch", "60", "--steps", "90", "--log-every", "30")
 
 

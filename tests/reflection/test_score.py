@@ -122,7 +122,7 @@ def test_parts_add_up():
     assert result.per_view.shape == (6, 4)
     torch.testing.assert_close(result.score, result.per_view.mean())
     variation = reflection_variation(
-        vertices, topology, camera.axes[:, 2], visibility=edge_visibility(vertices, topology, camera)
+        vertices, topology, camera.axes[:, 2], visibility=edge_visibility(vertices, topology, camera, size=192)
     )
     torch.testing.assert_close(
         result.reflection_variation, variation.mean() / face_areas(vertices, topology).sum().sqrt()

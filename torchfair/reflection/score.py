@@ -11,7 +11,7 @@ from ..geometry import face_areas
 from ..geometry._ops import norm
 from ..topology import Topology
 from ._comparison import blur, comparison_window, dissimilarity, masked_mean
-from .camera import Camera, Size
+from .camera import Camera, Size, height_and_width
 from .edge_visibility import edge_visibility
 from .perspective_camera import PerspectiveCamera
 from .setup import Pictures, ReflectionSetup
@@ -162,7 +162,9 @@ def _edge_pixels(vertices: Tensor, topology: Topology, setup: ReflectionSetup) -
 def _variation(vertices: Tensor, topology: Topology, setup: ReflectionSetup) -> Tensor:
     """Mean visible variation over the views divided by the square root of the area."""
     camera = setup.camera
-    visibility = edge_visibility(vertices, topology, camera)
+    height, width = height_and_width(setup.size)
+    samples = (height * setup.supersampling, width * setup.supersampling)
+    visibility = edge_visibility(vertices, topology, camera, size=samples)
     if isinstance(camera, PerspectiveCamera):
         distances = norm(camera.targets - camera.eyes).to(vertices)
         values = distances * reflection_variation_from_eyes(vertices, topology, camera.eyes, visibility=visibility)
