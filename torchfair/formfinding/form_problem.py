@@ -104,7 +104,8 @@ class FormProblem:
 
         size = self.topology.num_vertices
         reach = (_EVENED * size**0.5) ** 2 / 6.0
-        return splu((eye_array(size) + reach * graph_laplacian(self.topology)).tocsc())
+        matrix = (eye_array(size) + reach * graph_laplacian(self.topology)).tocsc()
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
     # ---- vertices move in space ------------------------------------------------------------------------
 

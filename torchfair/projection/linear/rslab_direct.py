@@ -15,6 +15,7 @@ from .direct import SparseDirect, Substitution
 
 _ROUGHEST = 1e-9  # relative remainder of every step, so that results do not depend on how sums are rounded
 _REFINEMENTS = 8
+_SMALLEST_RACE = 20_000  # unknowns
 _LEAST_PROGRESS = 0.1  # of a refinement that is worth another one
 
 
@@ -44,12 +45,12 @@ class RslabDirect(SparseDirect):
         self.single = True
         ones = np.ones(self._pattern.rows.size)
         ones[self._pattern.offsets[:-1]] = self._size
-        # Nested dissection takes part in the race of orderings from small sizes on, and goes down to small parts: a
-        # fifth less work per factor.
+        # Nested dissection goes down to small parts, which saves a fifth of the work per factor. It takes part in the
+        # race of orderings where it gains more in ten factors than the race costs.
         self._symbolic = rslab.analyze(
             self._lower(ones),
             path="ldlt",
-            race_nd_min_n=1000,
+            race_nd_min_n=_SMALLEST_RACE,
             race_nd_min_work=1_000_000,
             nd_leaf_size=100,
             threads=("auto", os.cpu_count() or 1),
