@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn, TextIO
 
 from ..errors import TorchfairError
-from . import diagnose, fair, form, measure, reflect
+from . import diagnose, fair, form, measure, reflect, symmetric
 from .errors import CommandError
 
 EXIT_OK = 0
@@ -19,7 +19,7 @@ EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130
 EXIT_BROKEN_PIPE = 141  # what a shell reports for a program ended by SIGPIPE
 
-_COMMANDS = (measure, diagnose, reflect, fair, form)
+_COMMANDS = (measure, diagnose, reflect, fair, form, symmetric)
 _DESCRIPTION = "Visual smoothness of polyhedral surfaces: measure it, improve it."
 _EPILOG = (
     "exit codes: 0 done; 2 wrong usage, unreadable input, existing output or unsuitable mesh "

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from .errors import CommandError
 
 if TYPE_CHECKING:
-    from ..formfinding import FairResult, FormResult
+    from torch import Tensor
+
+    from ..formfinding import FairResult, FormResult, SymmetricResult
     from ..topology import Topology
 
 _MESH_FORMATS = (".obj", ".off", ".ply")
@@ -49,17 +51,22 @@ class Outputs:
     def write_mesh_and_report(
         self,
         topology: Topology,
-        result: FairResult | FormResult,
+        result: FairResult | FormResult | SymmetricResult,
         settings: object,
         arguments: argparse.Namespace,
         extra: Mapping[str, Any],
+        *,
+        polylines: Sequence[Tensor] = (),
     ) -> None:
-        """Writes the mesh, which is what must not be lost, then the report: what all jobs report, and ``extra``."""
+        """Writes the mesh, which is what must not be lost, then the report: what all jobs report, and ``extra``.
+
+        Polylines become line elements of an OBJ file.
+        """
         from ..io import save_mesh
         from .report import write_report
 
         run = result.projection
-        save_mesh(self.mesh, result.vertices, topology, overwrite=arguments.force)
+        save_mesh(self.mesh, result.vertices, topology, overwrite=arguments.force, polylines=polylines)
         common = {
             "input": arguments.input,
             "output": str(self.mesh),

@@ -71,6 +71,21 @@ class SymmetricResult:
         """Of the finest level."""
         return self.levels[-1].principal
 
+    @property
+    def projection(self) -> ProjectionResult:
+        """The last run."""
+        return self.levels[-1].runs[-1]
+
+    @property
+    def before(self) -> dict[str, float]:
+        """Measures of the input."""
+        return self.levels[0].before
+
+    @property
+    def after(self) -> dict[str, float]:
+        """Measures of the finest level."""
+        return self.levels[-1].after
+
 
 def principal_symmetric(
     vertices: Tensor,

@@ -27,7 +27,7 @@ from .symmetric_report import condition_residuals, saddle_sides_right, symmetric
 from .symmetric_settings import SymmetricSettings
 
 _EXACT = ProjectionSettings(
-    max_iterations=30,
+    max_iterations=18,
     initial_damping=1e-4,
     damping_scale="identity",
     merit_tolerance=1e-16,
@@ -35,7 +35,12 @@ _EXACT = ProjectionSettings(
     least_extrapolation=math.inf,
 )
 _TIGHT_STEPS = 5
+_PORTION_STEPS = 6
+_LONGEST_PULL = 3.0  # mean edge lengths that handles are pulled at once
+_MOST_PORTIONS = 12
 _MORE_MARGIN = 1.6  # from round to round
+_LESS_PULL = 0.1
+_FEW = 0.01  # share of stars with wrong sides that a wider margin may mend
 
 
 class SymmetricDesign:
@@ -100,20 +105,25 @@ class SymmetricDesign:
     def solve(self, callback: Callback | None = None) -> bool:
         """Meets the conditions near the current state; returns whether it was stopped by callback or Ctrl-C.
 
-        The shape is found with weighted conditions; then they are met exactly, with the handles where they are.
-        Saddle sides that come out wrong are tried again with a wider margin. The best state found is kept.
+        The shape is found with weighted conditions; then they are met exactly, by the
+        shortest way. Where that fails it is tried again with handles that pull less: they yield to the conditions. A few saddle
+        sides that come out wrong are tried again with a wider margin. The best state found is kept.
         """
-        begin = len(self.runs)
+        begin, start = len(self.runs), self._state
         best: tuple[tuple[float, float], State] | None = None
-        self.problem.sides.margin = self.settings.saddle_margin
+        self.problem.sides.margin, self.problem.pull = self.settings.saddle_margin, 1.0
         for attempt in range(self.settings.rounds):
             stopped = self._round(callback, begin, first=attempt == 0)
             score = self._score()
             if best is None or score < best[0]:
                 best = (score, self._state)
-            if stopped or (score[0] <= self.settings.tolerance and score[1] == 0.0) or not self._steps_left(begin):
+            if stopped or score == (self.settings.tolerance, 0.0) or not self._steps_left(begin):
                 break
-            self.problem.sides.margin *= _MORE_MARGIN
+            if score[0] > self.settings.tolerance or score[1] > _FEW * self.stars.vertices.shape[0]:
+                self._state = start
+                self.problem.pull *= _LESS_PULL
+            else:
+                self.problem.sides.margin *= _MORE_MARGIN
         assert best is not None
         self._take(best[1])
         return stopped
@@ -177,6 +187,8 @@ class SymmetricDesign:
         settings = self.settings
         wrong = self.problem.sides.decide(self._state["vertices"])
         aims = [Aim.SHAPE, Aim.TIGHT, Aim.EXACT]
+        if first and self._approach(begin, callback):
+            return True
         for aim in aims:
             if aim is Aim.TIGHT and first:
                 wrong = self.problem.sides.decide(self._state["vertices"])
@@ -190,8 +202,21 @@ class SymmetricDesign:
             }[aim]
             if self._run(aim, chosen, begin, callback):
                 return True
-        if self._score()[0] > settings.tolerance and self.handles.numel():
-            return self._run(Aim.RELEASED, _EXACT, begin, callback)
+        return False
+
+    def _approach(self, begin: int, callback: Callback | None) -> bool:
+        """Pulls handles most of the way in portions, where they are far from their targets."""
+        start, end = self._state["vertices"][self.handles], self.problem.targets
+        farthest = float(torch.linalg.vector_norm(end - start, dim=1).max()) if self.handles.numel() else 0.0
+        portions = math.ceil(farthest / _LONGEST_PULL)
+        for portion in range(1, min(portions, _MOST_PORTIONS)):
+            self.problem.targets = start.lerp(end, portion / portions)
+            self.problem.sides.decide(self._state["vertices"])
+            chosen = replace(self.settings.projection, max_iterations=_PORTION_STEPS)
+            stopped = self._run(Aim.SHAPE, chosen, begin, callback)
+            self.problem.targets = end
+            if stopped:
+                return True
         return False
 
     def _run(self, aim: Aim, settings: ProjectionSettings, begin: int, callback: Callback | None) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+import torch
 from torch import Tensor
 
 from .. import constraints as c
@@ -30,8 +31,7 @@ class Aim(Enum):
 
     SHAPE = "conditions, saddle sides and everything else, weighted"
     TIGHT = "the same with conditions weighted more"
-    EXACT = "conditions alone; handles keep their places"
-    RELEASED = "conditions alone"
+    EXACT = "conditions alone"
 
 
 class SymmetricProblem:
@@ -48,6 +48,7 @@ class SymmetricProblem:
 
     Attributes:
         targets: (n, 3) of the handles; assign to move them.
+        pull: Factor of the weight of handles.
         sides: What stars are to be; see :class:`~torchfair.constraints.saddle_sides.SaddleSides`.
     """
 
@@ -63,6 +64,7 @@ class SymmetricProblem:
     ) -> None:
         self.base, self.topology, self.stars, self.settings = base, principal.topology, stars, settings
         self.handles, self.fixed, self.targets = handles, fixed, base[handles]
+        self.pull = 1.0
         self.edges = between_stars(self.topology.edges[principal.mask], stars)
         self.sides = SaddleSides(stars, margin=settings.saddle_margin)
         self._planes = None if reference is None else TangentPlanes(reference)
@@ -82,13 +84,10 @@ class SymmetricProblem:
     def compiled(self, aim: Aim) -> GuidedProjection:
         """The run of an aim, with its symbolic analysis made once."""
         if aim not in self._compiled or self.settings.formulation == "lifted":
-            fixed = self.fixed.clone()
-            if aim is Aim.EXACT:
-                fixed[self.handles] = True
             self._compiled[aim] = GuidedProjection(
                 self.blocks(self.base),
                 self.terms(aim),
-                fixed={"vertices": fixed[:, None].expand(-1, 3).contiguous()},
+                fixed={"vertices": self.fixed[:, None].expand(-1, 3).contiguous()},
                 solver=self.settings.projection.solver,
             )
         return self._compiled[aim]
@@ -96,13 +95,14 @@ class SymmetricProblem:
     def terms(self, aim: Aim) -> list[ElementTerm]:
         """Element terms of an aim."""
         settings = self.settings
-        if aim in (Aim.EXACT, Aim.RELEASED):
+        if aim is Aim.EXACT:
             return self._conditions(settings.constraint_weight)
         weight = settings.constraint_weight if aim is Aim.SHAPE else settings.tight_weight
         return [
             *self._conditions(weight),
             *self.sides.terms(weight=settings.saddle_weight),
             *c.displacement_fairness_terms(self.base, self.topology, weight=settings.fairness_weight),
+            *self._anchors(),
             *self._handles(),
             *self._closeness(),
             *self._energy(),
@@ -119,6 +119,14 @@ class SymmetricProblem:
             *c.coplanar_terms(self.edges, self.stars, weight=weight),
         ]
 
+    def _anchors(self) -> list[ElementTerm]:
+        if not self.settings.anchor_weight:
+            return []
+        everywhere = torch.arange(self.topology.num_vertices)
+        stencil = [("vertices", everywhere[:, None])]
+        weight = self.settings.anchor_weight
+        return [ElementTerm("anchors", offset, stencil, data=(self.base,), weight=weight, linear=True)]
+
     def _handles(self) -> list[ElementTerm]:
         if not self.handles.numel():
             return []
@@ -126,10 +134,10 @@ class SymmetricProblem:
         return [
             ElementTerm(
                 "handles",
-                offset,
+                pulled_offset,
                 stencil,
                 weight=self.settings.handle_weight,
-                refresh=lambda state: (self.targets,),
+                refresh=lambda state: (self.targets, self.targets.new_full(self.handles.shape, self.pull)),
             )
         ]
 
@@ -159,3 +167,8 @@ class SymmetricProblem:
         if not self._keeps_faces(state, trial):
             return False
         return float(corner_angles(trial["vertices"], self.topology).min()) > self._smallest_angle
+
+
+def pulled_offset(x: Tensor, target: Tensor, pull: Tensor) -> Tensor:
+    """From the target to the vertex ``x`` (1, 3), times the square root of ``pull``."""
+    return pull.sqrt() * offset(x, target)

@@ -27,6 +27,8 @@ class SymmetricSettings:
         tight_weight: Their weight once it is found; at last they are met exactly, without any other aim.
         fairness_weight: Weight of squared umbrella vectors of the displacement from the start of the level: handles
             pull their surroundings along.
+        anchor_weight: Weight of the squared displacement itself: how far around a handle the mesh follows, about the
+            inverse fourth root of its quotient with ``fairness_weight`` in edges.
         handle_weight: Weight of the squared distance of handles from their targets.
         closeness_weight: Weight of the squared distance from the reference surface, if there is one.
         energy_weight: Weight of E, the paper's w_target; 0 without.
@@ -37,7 +39,8 @@ class SymmetricSettings:
         smallest_angle: No corner angle falls below this while the shape is found, radians; 0 for no bound.
         tolerance: Largest relative residual of the conditions at which they count as met.
         most_steps: Damped steps that one level may take at most.
-        rounds: How often saddle sides that came out wrong are tried again.
+        rounds: How often a shape is looked for at most: with handles pulling less each time if the conditions could
+            not be met, with wider margins if just some saddle sides came out wrong.
         formulation: ``"spheres"`` has normals and curvatures of the stars' spheres as unknowns beside the vertices,
             ``"eliminated"`` the vertices alone, ``"lifted"`` the paper's variables.
         projection: Damping, tolerances and linear solver while the shape is found.
@@ -46,6 +49,7 @@ class SymmetricSettings:
     constraint_weight: float = 1e2
     tight_weight: float = 1e4
     fairness_weight: float = 1.0
+    anchor_weight: float = 1e-5
     handle_weight: float = 1e2
     closeness_weight: float = 1.0
     energy_weight: float = 0.0
@@ -55,8 +59,8 @@ class SymmetricSettings:
     boundary: str = "free"
     smallest_angle: float = math.radians(10.0)
     tolerance: float = 1e-8
-    most_steps: int = 150
-    rounds: int = 4
+    most_steps: int = 200
+    rounds: int = 6
     formulation: str = "spheres"
     projection: ProjectionSettings = field(default_factory=_default_projection)
 

@@ -1,0 +1,101 @@
+"""What ``torchfair symmetric`` needs to know of a mesh: principal edges, fixed vertices, polylines."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import MeshFileError
+from .errors import CommandError
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from ..io import PolygonMesh
+    from ..principal import PrincipalEdges
+
+
+def read_principal_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[PrincipalEdges, list[str]]:
+    """Principal edges as asked for, and what was decided, in words."""
+    from ..io import load_edge_labels
+    from ..principal import PrincipalEdges, principal_edges_from_directions, principal_edges_from_seed
+
+    topology, allow = mesh.topology, arguments.allow_exceptions
+    if arguments.seed is not None:
+        edges = principal_edges_from_seed(topology, _edge(arguments.seed, mesh), allow_exceptions=allow)
+        return edges, _exceptions(edges)
+    file = arguments.labels or _labels_beside(arguments.input)
+    if file is not None:
+        edges = PrincipalEdges(topology, load_edge_labels(file, topology))
+        return (edges if allow else edges.check()), [f"principal edges are those of {file}", *_exceptions(edges)]
+    aligned = principal_edges_from_directions(mesh.vertices, topology, allow_exceptions=allow)
+    note = f"principal edges follow principal directions, {aligned.misalignment:.2g} radians off on average"
+    return aligned.edges, [note, *_exceptions(aligned.edges)]
+
+
+def vertex_mask(option: str, chosen: Sequence[int], mesh: PolygonMesh) -> Tensor:
+    """(V,) bool of chosen vertices."""
+    import torch
+
+    mask = torch.zeros(mesh.topology.num_vertices, dtype=torch.bool)
+    wrong = [vertex for vertex in chosen if vertex >= len(mask)]
+    if wrong:
+        raise CommandError(f"{option}: vertices are numbered 0 to {len(mask) - 1}, got {wrong[0]}")
+    mask[list(chosen)] = True
+    return mask
+
+
+def polyline_vertices(chosen: Sequence[int], mesh: PolygonMesh, edges: PrincipalEdges) -> Tensor:
+    """Vertices of the principal polylines through the chosen ones."""
+    import torch
+
+    mask = vertex_mask("--on", chosen, mesh)
+    lines = [line for line in edges.polylines() if bool(mask[line].any())]
+    if not lines:
+        raise CommandError(f"--on: no principal polyline passes through {', '.join(map(str, chosen))}")
+    on_lines: Tensor = torch.unique(torch.cat(lines))
+    return on_lines
+
+
+def _edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
+    import torch
+
+    from .._graph import edge_numbers
+
+    vertex_mask("--seed", ends, mesh)
+    number = int(edge_numbers(mesh.topology, torch.tensor([list(ends)]))[0])
+    if number < 0:
+        raise CommandError(f"--seed: vertices {ends[0]} and {ends[1]} are not joined by an edge")
+    return number
+
+
+def _labels_beside(name: str) -> Path | None:
+    """The file that marks edges of INPUT, if there is one."""
+    from ..io import edge_labels_path
+
+    if name.startswith("example:"):
+        return None
+    path = edge_labels_path(name)
+    if path.suffix.lower() == ".obj":
+        return path if _has_lines(path) else None
+    return path if path.exists() else None
+
+
+def _has_lines(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return any(line.lstrip().startswith((b"l ", b"l\t")) for line in file)
+    except OSError as error:
+        raise MeshFileError(path, str(error.strerror or error)) from None
+
+
+def _exceptions(edges: PrincipalEdges) -> list[str]:
+    notes = []
+    for what, vertices in (("singular", edges.singular), ("with principal edges that do not fit", edges.exceptions)):
+        if vertices.numel():
+            some = ", ".join(map(str, vertices[:8].tolist()))
+            more = ", ..." if vertices.numel() > 8 else ""
+            notes.append(f"no conditions at {vertices.numel()} vertices {what}: {some}{more}")
+    return notes
