@@ -273,3 +273,11 @@ def test_wrong_arguments_are_named():
         reflection_variation(vertices, topology, form="cosine")
     with pytest.raises(TorchfairError, match="form must be"):
         ReflectionVariation(topology, form="cosine")
+
+
+def test_compiles_to_one_graph():
+    vertices, topology = wavy_grid(4, 4)
+    for form in FORMS:
+        module = ReflectionVariation(topology, form=form)
+        compiled = torch.compile(module, fullgraph=True, backend="eager")
+        torch.testing.assert_close(compiled(vertices), module(vertices))
