@@ -9,12 +9,10 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError
+from .depth_keys import NO_KEY, depth_levels, key_bits, pack_keys, unpack_keys
 from .scan import Spans, span_chunks, triangle_spans
 
-_DEPTH_LEVELS = (1 << 31) - 1
 _BAND = 1 << 16  # pixels worked on at a time on a CPU: keeps every temporary inside the cache
-_LOW_BITS = (1 << 32) - 1
-_FAR = torch.iinfo(torch.int64).max  # all low bits set
 
 
 class Fragments(NamedTuple):
@@ -37,7 +35,7 @@ def rasterise(points: Tensor, triangles: Tensor, width: int, height: int) -> Fra
 
     Pixel ``(row j, column i)`` is the square ``[i, i+1] x [j, j+1]`` and is sampled at its centre. Triangles that
     share an edge never both cover a pixel along it and leave no gap. Both sides of a triangle are drawn. Equal
-    depths (to ``2^-31`` of the depth range) go to the triangle with the smaller number, on every device.
+    depths (to ``2^-31`` of the depth range or less) go to the triangle with the smaller number, on every device.
 
     Depth and weights are differentiable with respect to ``points``; which triangle is seen is not (it is constant
     almost everywhere).
@@ -80,24 +78,19 @@ def visible_triangles(
     """
     _check(points, triangles, width, height)
     shape = (height, width) if num_pictures is None else (num_pictures, height, width)
-    nearest = torch.full((math.prod(shape),), _FAR, device=points.device)
+    nearest = torch.full((math.prod(shape),), NO_KEY, device=points.device)
+    bits = key_bits(triangles.shape[0])
     spans = triangle_spans(points, triangles, width, height)
     picture = spans.triangle.new_zeros(()).expand_as(spans.triangle)
     if pictures is not None:
         picture = pictures.index_select(0, spans.triangle)
     first_pixel = (picture * height + spans.row) * width + spans.start
-    first_level, level_step = _quantise(spans, picture, num_pictures or 1)
+    first_level, level_step = _quantise(spans, picture, num_pictures or 1, bits)
     for span, offset in span_chunks(spans):
         level = first_level.index_select(0, span) + level_step.index_select(0, span) * offset
-        key = (level.to(torch.int64) << 32) | spans.triangle.index_select(0, span)
+        key = pack_keys(level, spans.triangle.index_select(0, span), bits)
         nearest.scatter_reduce_(0, first_pixel.index_select(0, span) + offset, key, "amin")
-    return unpack_nearest(nearest).view(shape)
-
-
-def unpack_nearest(keys: Tensor) -> Tensor:
-    """Numbers in the low half of the smallest keys, -1 where there was none; overwrites ``keys``."""
-    seen = keys.bitwise_and_(_LOW_BITS)  # in place: the buffer is large
-    return seen.masked_fill_(seen == _LOW_BITS, -1)
+    return unpack_keys(nearest, bits).view(shape)
 
 
 def interpolate(points: Tensor, triangles: Tensor, face_index: Tensor) -> tuple[Tensor, Tensor]:
@@ -139,21 +132,13 @@ def _affine_tables(points: Tensor, triangles: Tensor) -> Tensor:
     return torch.cat([torch.cat([origin, first, second], dim=1), background])
 
 
-def _quantise(spans: Spans, picture: Tensor, num_pictures: int) -> tuple[Tensor, Tensor]:
-    """Depths of spans as levels in ``0 .. 2^31 - 1`` of the range of their picture: first pixel and step."""
+def _quantise(spans: Spans, picture: Tensor, num_pictures: int, bits: int) -> tuple[Tensor, Tensor]:
+    """Depth levels of spans: first pixel and step."""
     last = spans.depth + spans.depth_step * (spans.length - 1)
     lower, upper = torch.minimum(spans.depth, last), torch.maximum(spans.depth, last)
-    origin, scale = depth_levels(lower, upper, picture, num_pictures)
+    origin, scale = depth_levels(lower, upper, picture, num_pictures, bits)
     scale = scale.index_select(0, picture)
     return (spans.depth - origin.index_select(0, picture)) * scale, spans.depth_step * scale
-
-
-def depth_levels(lower: Tensor, upper: Tensor, picture: Tensor, num_pictures: int) -> tuple[Tensor, Tensor]:
-    """Origin and scale (pictures,) that map depths between ``lower`` and ``upper`` (n,) to ``0 .. 2^31 - 1``."""
-    low = lower.new_full((num_pictures,), torch.inf).scatter_reduce_(0, picture, lower, "amin")
-    high = lower.new_full((num_pictures,), -torch.inf).scatter_reduce_(0, picture, upper, "amax")
-    extent = high - low
-    return low, _DEPTH_LEVELS / torch.where(extent > 0, extent, 1)
 
 
 def _check(points: Tensor, triangles: Tensor, width: int, height: int) -> None:

@@ -8,15 +8,13 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from .rasterise import depth_levels, unpack_nearest
+from .depth_keys import NO_KEY, depth_levels, key_bits, pack_keys, unpack_keys
 from .runs import run_chunks
 from .segments import Segments
 from .touch import TouchedSpans, touched_spans
 
-STEP = 1e-5
+STEP = 1e-6
 """Pixels from an edge to the places on its sides."""
-
-_FAR = torch.iinfo(torch.int64).max
 
 
 class Places(NamedTuple):
@@ -56,13 +54,13 @@ def seen_beside(
         shape: number of pictures, height, width.
     """
     places = _places(segments, ends)
-    nearest = torch.full((2, places.pixel.shape[0]), _FAR, device=corners.device)
+    nearest = torch.full((2, places.pixel.shape[0]), NO_KEY, device=corners.device)
     spans = touched_spans(corners[..., :2], shape[2], shape[1])
     tables = _tables(corners, pictures, shape[0], spans)
     for span, place in _meetings(spans, pictures, places.pixel, shape):
         keys = _keys(tables, spans.triangle.index_select(0, span), places, place)
         nearest.scatter_reduce_(1, place.expand(2, -1), keys, "amin")
-    return unpack_nearest(nearest).T
+    return unpack_keys(nearest, key_bits(corners.shape[0])).T
 
 
 def _places(segments: Segments, ends: Tensor) -> Places:
@@ -77,7 +75,7 @@ def _tables(corners: Tensor, pictures: Tensor, num_pictures: int, spans: Touched
     x, y, z = corners.unbind(-1)
     touching = spans.triangle
     lower, upper = z.amin(1), z.amax(1)
-    levels = depth_levels(lower[touching], upper[touching], pictures[touching], num_pictures)
+    levels = depth_levels(lower[touching], upper[touching], pictures[touching], num_pictures, key_bits(z.shape[0]))
     origin, scale = (part.index_select(0, pictures)[:, None] for part in levels)
     level = (z - origin) * scale
     dx, dy = x.roll(-1, 1) - x, y.roll(-1, 1) - y
@@ -115,4 +113,4 @@ def _keys(tables: Tables, triangle: Tensor, places: Places, place: Tensor) -> Te
     sides = torch.stack([values - slopes, values + slopes])
     inside = torch.minimum(torch.minimum(sides[:, 0], sides[:, 1]), sides[:, 2]) >= 0
     level = torch.clamp(sides[:, 3], *tables.bounds.index_select(1, triangle))
-    return torch.where(inside, (level.to(torch.int64) << 32) | triangle, _FAR)
+    return torch.where(inside, pack_keys(level, triangle, key_bits(tables.bounds.shape[1])), NO_KEY)
