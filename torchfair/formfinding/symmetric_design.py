@@ -63,7 +63,8 @@ class SymmetricDesign:
 
     Raises:
         ShapeError: vertices or masks do not fit the topology.
-        MeshError: vertices are not finite, a face has no area, or there is no star to impose conditions on.
+        MeshError: vertices are not finite, a face has no area, a handle is fixed, or there is no star to impose
+            conditions on.
     """
 
     def __init__(
@@ -85,6 +86,9 @@ class SymmetricDesign:
         self.stars = _chosen(self.principal.stars(), on)
         self.fixed = self._fixed(fixed)
         self.handles = torch.tensor(list(handles), dtype=torch.int64)
+        held = self.handles[self.fixed[self.handles]].tolist()
+        if held:
+            raise MeshError(f"handles {held[:10]} are fixed: free them, or move them before")
         self.runs: list[ProjectionResult] = []
         self.notes: list[str] = []
         surface = None
@@ -110,6 +114,10 @@ class SymmetricDesign:
         sides that come out wrong are tried again with a wider margin. The best state found is kept.
         """
         begin, start = len(self.runs), self._state
+        if self._is_done():
+            stopped = self._run(Aim.EXACT, _EXACT, begin, callback)
+            self._take(self._state)
+            return stopped
         best: tuple[tuple[float, float], State] | None = None
         self.problem.sides.margin, self.problem.pull = self.settings.saddle_margin, 1.0
         for attempt in range(self.settings.rounds):
@@ -235,6 +243,14 @@ class SymmetricDesign:
 
     def _steps_left(self, begin: int) -> int:
         return max(0, self.settings.most_steps - sum(run.iterations for run in self.runs[begin:]))
+
+    def _is_done(self) -> bool:
+        """Whether the state is all that is asked for already."""
+        if self._reference is not None or self.settings.energy_weight:
+            return False
+        away = self._state["vertices"][self.handles] - self.problem.targets
+        at_targets = not away.numel() or float(away.abs().max()) <= self.settings.tolerance
+        return at_targets and self._score() == (self.settings.tolerance, 0.0)
 
     def _score(self) -> tuple[float, float]:
         """Largest relative residual, and how many saddle sides are wrong: what a round is judged by."""

@@ -1,0 +1,126 @@
+"""``torchfair symmetric``: labels from everywhere, files written, strips, refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+from helpers import wavy_grid
+
+from torchfair.cli import main
+from torchfair.formfinding.symmetric_report import condition_residuals
+from torchfair.io import load_edge_labels, load_mesh, save_edge_labels, save_mesh
+from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
+from torchfair.shapes import Catenoid, Paraboloid, Torus, principal_triangles
+from torchfair.shapes.principal_triangles import parameter_triangles
+
+
+@pytest.fixture
+def torus(tmp_path: Path) -> Path:
+    mesh = principal_triangles(Torus(2.0, 1.0), 8, 10)
+    save_mesh(tmp_path / "torus.obj", mesh.vertices, mesh.topology)
+    return tmp_path / "torus.obj"
+
+
+def error_line(capsys: pytest.CaptureFixture[str]) -> str:
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert err.startswith("torchfair symmetric: error: ")
+    return err
+
+
+def test_everything_is_written_and_holds(torus: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = torus.parent / "design" / "fine.obj"
+    words = [str(torus), "-o", str(output), "--handle", "3", "2.9", "2.1", "0.2", "--levels", "1", "--strips", "0.1"]
+    assert main(["symmetric", *words]) == 0
+    out, err = capsys.readouterr()
+    assert "level 1: 320 vertices" in out
+    assert "iteration" in err
+    fine = load_mesh(output)
+    edges = PrincipalEdges(fine.topology, load_edge_labels(output, fine.topology)).check()
+    for values in condition_residuals(fine.vertices, edges, edges.stars()).values():
+        assert float(values.max()) < 1e-8
+    report = json.loads((output.parent / "report.json").read_text())
+    assert [level["vertices"] for level in report["levels"]] == [80, 320]
+    assert report["levels"][1]["after"]["crossing_pyramids_negative"] == 0
+    assert report["strips"]["largest_isometry_error"] < 1e-6
+    assert report["energies"]["after"]["largest_cospherical"] < 1e-8
+    assert load_mesh(output.parent / "strips.obj").topology.num_faces == report["strips"]["quads"]
+    assert (output.parent / "strips.svg").read_text().startswith("<svg")
+    for name in ("principal.png", "edges.png"):
+        assert (output.parent / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_labels_come_from_the_input_from_a_file_from_a_seed_or_from_directions(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mesh = principal_triangles(Catenoid(), 6, 10, along="v", ends="zigzag")
+    edges = principal_edges_of_lattice(mesh, "v")
+    plain, marked, side = tmp_path / "plain.obj", tmp_path / "marked.obj", tmp_path / "side.json"
+    save_mesh(plain, mesh.vertices, mesh.topology)
+    save_mesh(marked, mesh.vertices, mesh.topology, polylines=edges.polylines())
+    save_edge_labels(side, mesh.topology, edges.mask)
+    v, w = mesh.topology.edges[edges.mask][0].tolist()
+    for number, words in enumerate(
+        ([str(plain), "--seed", str(v), str(w)], [str(plain), "--labels", str(side)], [str(marked)], [str(plain)])
+    ):
+        output = tmp_path / f"{number}.ply"
+        folder = ["--results", str(tmp_path / str(number)), "--no-pictures"]
+        assert main(["symmetric", *words, "-o", str(output), *folder]) == 0
+        labels = load_edge_labels(output.with_suffix(".edges.json"), mesh.topology)
+        assert torch.equal(labels, edges.mask), words
+    out, _ = capsys.readouterr()
+    assert "follow principal directions" in out
+    assert f"those of {marked}" in out
+
+
+def test_conditions_on_one_polyline(torus: Path) -> None:
+    output = torus.parent / "one.obj"
+    words = [str(torus), "-o", str(output), "--on", "12", "--energy", "0.1", "--no-pictures", "--steps", "40"]
+    assert main(["symmetric", *words]) == 0
+    report = json.loads((torus.parent / "report.json").read_text())
+    assert report["levels"][0]["after"]["stars"] == 10
+
+
+def test_refusals(torus: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = ["-o", str(torus.parent / "x.obj")]
+    for words, said in (
+        ([str(torus), *output, "--seed", "0", "77"], "not joined"),
+        ([str(torus), *output, "--fix", "800"], "numbered 0 to 79"),
+        ([str(torus), *output, "--on", "800"], "numbered 0 to 79"),
+        ([str(torus), *output, "--handle", "3", "a", "b", "c"], "--handle"),
+        ([str(torus), *output, "--fix", "3", "--handle", "3", "0", "0", "0"], "fixed"),
+        ([str(torus), *output, "--dxf"], "--strips"),
+        ([str(torus), *output, "--strips", "0"], "height"),
+        ([str(torus), *output, "--strips", "1", "--millimetres", "0"], "--millimetres"),
+        ([str(torus), "-o", str(torus.parent / "x.txt")], "cannot write"),
+        ([str(torus), "-o", str(torus)], "exists"),
+        ([str(torus), *output, "--reference", str(torus.parent / "none.obj")], "none.obj"),
+    ):
+        assert main(["symmetric", *words]) == 2, words
+        assert said in error_line(capsys)
+    assert not (torus.parent / "x.obj").exists()
+
+
+def test_meshes_without_triangles_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vertices, topology = wavy_grid()
+    save_mesh(tmp_path / "quads.obj", vertices, topology)
+    assert main(["symmetric", str(tmp_path / "quads.obj"), "-o", str(tmp_path / "x.obj")]) == 2
+    assert "triangle" in error_line(capsys)
+
+
+def test_exceptions_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = parameter_triangles(Paraboloid(0.5, -0.5), 6, 6, ends="zigzag")
+    edges = principal_edges_of_lattice(mesh, "u")
+    mask = edges.mask.clone()
+    mask[torch.nonzero(mask)[int(mask.sum()) // 2]] = False
+    save_mesh(tmp_path / "saddle.obj", mesh.vertices, mesh.topology)
+    save_edge_labels(tmp_path / "holes.json", mesh.topology, mask)
+    words = [str(tmp_path / "saddle.obj"), "--labels", str(tmp_path / "holes.json"), "-o", str(tmp_path / "x.obj")]
+    assert main(["symmetric", *words, "--no-pictures"]) == 2
+    assert "principal edges" in error_line(capsys)
+    assert main(["symmetric", *words, "--no-pictures", "--allow-exceptions"]) == 0
+    assert "do not fit" in capsys.readouterr().out

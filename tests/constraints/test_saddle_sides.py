@@ -1,0 +1,104 @@
+"""Saddle sides: what stars lack, against their definition and against pyramids."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from helpers import DOUBLE, random_rotation
+
+from torchfair.constraints.saddle_sides import SaddleSides, angle_excess, face_side_curvatures, star_stencil
+from torchfair.geometry import corner_angles
+from torchfair.principal import principal_edges_of_lattice
+from torchfair.shapes import Catenoid, Torus, principal_triangles
+from torchfair.stars import pyramid_self_intersections
+
+
+def symmetric_star(principal: float, other: float, *, sideways: float = 0.0) -> torch.Tensor:
+    """(1, 7, 3) star whose principal neighbours have curvature ``principal`` and the others ``other``.
+
+    ``sideways`` bends the principal polyline within the surface.
+    """
+    places = [(1.0, sideways), (0.5, 0.9), (-0.5, 0.9), (-1.0, sideways), (-0.5, -0.9), (0.5, -0.9)]
+    rows = [[0.0, 0.0, 0.0]]
+    for number, (x, y) in enumerate(places):
+        curvature = principal if number in (0, 3) else other
+        rows.append([x, y, 0.5 * curvature * (x * x + y * y)])
+    return torch.tensor([rows], dtype=DOUBLE)
+
+
+def test_angle_excess_equals_the_sum_of_corner_angles() -> None:
+    mesh = principal_triangles(Torus(2.0, 1.0), 12, 16)
+    stars = principal_edges_of_lattice(mesh).stars()
+    sums = torch.zeros(mesh.topology.num_vertices, dtype=DOUBLE)
+    sums.index_add_(0, mesh.topology.corners, corner_angles(mesh.vertices, mesh.topology))
+    excess = angle_excess(mesh.vertices[star_stencil(stars)])
+    torch.testing.assert_close(excess, sums[stars.vertices] - 2.0 * math.pi)
+    assert bool((excess > 0).any())
+    assert bool((excess < 0).any())
+
+
+@pytest.mark.parametrize("sideways", [0.0, 0.2, -0.2])
+def test_face_sides_follow_their_definition(sideways: float) -> None:
+    star = symmetric_star(0.3, -0.5, sideways=sideways) @ random_rotation(1).T + 1.0
+    v, w1, w2, w3, w4, w5, w6 = star[0]
+    values = []
+    for a, b in ((w2, w3), (w5, w6)):
+        normal = torch.linalg.cross(a - v, b - v)
+        normal = normal / normal.norm()
+        values += [2.0 * normal @ (w - v) / (w - v).square().sum() for w in (w1, w4)]
+    torch.testing.assert_close(face_side_curvatures(star)[0], torch.stack(values))
+
+
+def test_stars_on_the_right_side_of_both_faces_have_simple_pyramids_and_others_cross() -> None:
+    """The bound is sharp: where a principal neighbour passes through the plane of a face the pyramid closes up."""
+    from torchfair import Topology
+
+    fan = Topology.from_faces([[0, 1 + i, 1 + (i + 1) % 6] for i in range(6)])
+    for sideways in (0.0, 0.15, 0.3):
+        for principal in torch.linspace(0.01, 0.6, 30).tolist():
+            star = symmetric_star(principal, -0.5, sideways=sideways)
+            if float(angle_excess(star)) < 1e-3:
+                continue
+            beyond = bool((face_side_curvatures(star) > 0.0).all())
+            crossings = int(pyramid_self_intersections(star[0], fan)[0])
+            if beyond:
+                assert crossings == 0
+            elif float(face_side_curvatures(star).min()) < -1e-3:
+                assert crossings > 0
+
+
+def test_decisions_and_what_is_lacking() -> None:
+    mesh = principal_triangles(Catenoid(), 8, 14, ends="zigzag")
+    stars = principal_edges_of_lattice(mesh, "u").stars()
+    sides = SaddleSides(stars)
+    assert sides.decide(mesh.vertices) == 0
+    assert bool(sides.is_saddle.all())
+    (term,) = sides.terms(weight=1.0)
+    state = {"vertices": mesh.vertices}
+    assert float(term.values(term.arguments(state)).abs().max()) == 0.0
+    wide = SaddleSides(stars, margin=100.0)
+    values = wide.terms(weight=1.0)[0].values(wide.terms(weight=1.0)[0].arguments(state))
+    assert float(values.min()) >= 0.0
+    assert float(values.max()) > 0.0
+    # Pulled to the other side of the tangent plane, a principal neighbour makes stars lack something.
+    bent = mesh.vertices.clone()
+    inner = stars.principal[len(stars.vertices) // 2, 0]
+    bent[inner] *= 1.15
+    assert sides.count_wrong(bent) > 0
+    assert float(term.values(term.arguments({"vertices": bent})).abs().max()) > 0.0
+
+
+def test_a_star_of_small_excess_is_to_lose_it_and_one_of_large_excess_is_to_be_a_saddle() -> None:
+    mesh = principal_triangles(Torus(2.0, 1.0), 12, 16, along="u")
+    stars = principal_edges_of_lattice(mesh, "u").stars()
+    sides = SaddleSides(stars)
+    sides.decide(mesh.vertices)
+    excess = angle_excess(mesh.vertices[sides.stencil])
+    assert bool(sides.is_saddle[excess > 0.1].all())
+    assert not bool(sides.is_saddle[excess <= 0.0].any())
+    (term,) = sides.terms(weight=1.0)
+    values = term.values(term.arguments({"vertices": mesh.vertices}))
+    assert bool((values[~sides.is_saddle][:, :4] == 0.0).all())
+    assert bool((values[sides.is_saddle][:, 4] == 0.0).all())
