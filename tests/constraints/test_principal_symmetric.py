@@ -138,7 +138,7 @@ def test_a_flat_and_a_cylindrical_mesh_are_reached_from_bumpy_ones() -> None:
 
 
 def test_ends_that_are_no_stars_are_refused() -> None:
-    mesh, edges = lattice("catenoid")
+    edges = lattice("catenoid")[1]
     with pytest.raises(ShapeError, match="stars"):
         coplanar_terms(edges.topology.edges[edges.mask], edges.stars(), weight=1.0)
 

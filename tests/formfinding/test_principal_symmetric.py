@@ -237,9 +237,9 @@ def test_refusals() -> None:
         principal_symmetric(vertices[None], edges)
     with pytest.raises(MeshError, match="no vertex"):
         principal_symmetric(vertices, edges, handles={9999: [0.0, 0.0, 0.0]})
+    mask = torch.zeros(len(vertices), dtype=torch.bool)
+    mask[3] = True
     with pytest.raises(MeshError, match="fixed"):
-        mask = torch.zeros(len(vertices), dtype=torch.bool)
-        mask[3] = True
         principal_symmetric(vertices, edges, handles={3: [0.0, 0.0, 0.0]}, fixed=mask)
     with pytest.raises(MeshError, match="bool"):
         principal_symmetric(vertices, edges, fixed=torch.zeros(3, dtype=torch.bool))

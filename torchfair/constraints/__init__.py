@@ -16,8 +16,10 @@ from .gliding import gliding_terms as gliding_terms
 from .handles import handle_terms as handle_terms
 from .normal_variation import normal_variation_terms as normal_variation_terms
 from .planarity import planarity_terms as planarity_terms
+from .principal_symmetric import between_stars as between_stars
 from .principal_symmetric import coplanar_terms as coplanar_terms
 from .principal_symmetric import cospherical_terms as cospherical_terms
+from .principal_symmetric import sphere_blocks as sphere_blocks
 from .saddle_sides import SaddleSides as SaddleSides
 from .stars import pyramid_terms as pyramid_terms
 from .stars import saddle_terms as saddle_terms

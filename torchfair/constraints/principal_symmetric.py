@@ -69,7 +69,7 @@ def cospherical_terms(stars: PrincipalStars, *, weight: float, block: str = "ver
     Args:
         stars: Regular vertices; see :meth:`~torchfair.principal.PrincipalEdges.stars`.
         weight: Dimensionless.
-        block: Name of the vertex block; normals and curvatures are those of :func:`sphere_blocks`.
+        block: Name of the vertex block; normals and curvatures are those of :func:`~torchfair.constraints.sphere_blocks`.
     """
     number = torch.arange(stars.vertices.shape[0], device=stars.vertices.device)
     centres, spheres = (column.repeat_interleave(4) for column in (stars.vertices, number))
@@ -100,10 +100,10 @@ def coplanar_terms(
     """n(v), n(w) and the edge from v to w are coplanar, so that strips along polylines of such edges are developable.
 
     Args:
-        edges: (n, 2) principal edges; see :func:`between_stars`.
+        edges: (n, 2) principal edges; see :func:`~torchfair.constraints.between_stars`.
         stars: Regular vertices, among them all ends of edges.
         weight: Dimensionless.
-        block: Name of the vertex block; normals are those of :func:`sphere_blocks`.
+        block: Name of the vertex block; normals are those of :func:`~torchfair.constraints.sphere_blocks`.
 
     Raises:
         ShapeError: an end of an edge is no star.

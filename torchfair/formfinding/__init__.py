@@ -13,4 +13,6 @@ from .settings import FairSettings as FairSettings
 from .start_surface import start_surface as start_surface
 from .strip_normals import strip_normals as strip_normals
 from .symmetric_design import SymmetricDesign as SymmetricDesign
+from .symmetric_report import condition_residuals as condition_residuals
+from .symmetric_report import symmetric_measures as symmetric_measures
 from .symmetric_settings import SymmetricSettings as SymmetricSettings

@@ -59,6 +59,7 @@ class FormProblem:
         gliding = settings.boundary == "glide"
         self.fixed = staying_vertices(topology, track, settings)
         self.normals = normals
+        self._star_targets: Tensor | None = None
         self._conditions = c.handle_terms(handles, targets, weight=settings.handle_weight)
         if settings.umbrella_weight:
             self._conditions += c.interior_fairness_terms(topology, weight=settings.umbrella_weight)
@@ -115,10 +116,10 @@ class FormProblem:
             return {"vertices": vertices}
         return {"vertices": vertices, **lifted_absolute_curvature_blocks(vertices, self.topology)}
 
-    def terms(self, vertices: Tensor, smoothing: float) -> list[ElementTerm]:
+    def terms(self, vertices: Tensor, smoothing: float, *, correct: bool = False) -> list[ElementTerm]:
         """Terms whose unknowns are the vertices, or those of the lifted formulation; ``vertices`` are the start."""
         settings = self.settings
-        others = [*self._others(vertices, settings.fairness_weight), *self._in_space]
+        others = [*self._others(vertices, settings.fairness_weight, correct=correct), *self._in_space]
         if settings.formulation == "reduced":
             return [*self._curvature(smoothing), *others]
         lifted = lifted_absolute_curvature_terms(
@@ -151,19 +152,21 @@ class FormProblem:
     def _curvature(self, smoothing: float) -> list[ElementTerm]:
         return c.absolute_curvature_terms(self.topology, smoothing=smoothing, weight=self.settings.curvature_weight)
 
-    def _others(self, vertices: Tensor, fairness_weight: float) -> list[ElementTerm]:
+    def _others(self, vertices: Tensor, fairness_weight: float, *, correct: bool = False) -> list[ElementTerm]:
         """Fairness and conditions, the former and tangent planes as seen from ``vertices``."""
         return [
             *c.even_fairness_terms(vertices, self.topology, weight=fairness_weight),
             *self._conditions,
-            *self._tangent_planes(vertices),
+            *self._tangent_planes(vertices, correct),
         ]
 
-    def _tangent_planes(self, vertices: Tensor) -> list[ElementTerm]:
+    def _tangent_planes(self, vertices: Tensor, correct: bool) -> list[ElementTerm]:
         chosen = torch.nonzero((self.normals != 0.0).any(1)).squeeze(1)
         if not chosen.numel():
             return []
-        targets = c.BoundaryNormals.of(vertices, self.topology).star_targets(self.normals)
+        before = self._star_targets if correct else None
+        targets = c.BoundaryNormals.of(vertices, self.topology).star_targets(self.normals, before)
+        self._star_targets = targets
         return c.tangent_plane_terms(self.topology, chosen, targets[chosen], weight=self.settings.tangent_weight)
 
     def _gliding(self, track: BoundaryTrack, normalisation: Normalisation) -> list[ElementTerm]:

@@ -50,6 +50,6 @@ def _largest_tilt(vertices: Tensor, topology: Topology, normals: Tensor) -> floa
     chosen = torch.nonzero((normals != 0.0).any(1)).squeeze(1)
     if not chosen.numel():
         return 0.0
-    found = BoundaryNormals.of(vertices, topology).at_boundary()[chosen]
+    found = BoundaryNormals.of(vertices, topology).at_boundary[chosen]
     sine = torch.linalg.vector_norm(torch.linalg.cross(found, normals[chosen]), dim=1)
     return float(torch.atan2(sine, (found * normals[chosen]).sum(1)).max())

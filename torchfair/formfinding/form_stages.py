@@ -87,9 +87,9 @@ class FormStages:
         problem = self.problem
         # What tangent planes ask of stars depends on the surface inside: it is seen anew in every stage.
         rounds = _TANGENT_ROUNDS if problem.has_tangent_planes else 0
-        for fraction in [*smoothings, *[smoothings[-1]] * rounds]:
+        for number, fraction in enumerate([*smoothings, *[smoothings[-1]] * rounds]):
             blocks = problem.blocks(vertices)
-            terms = problem.terms(vertices, problem.smoothing(vertices, fraction))
+            terms = problem.terms(vertices, problem.smoothing(vertices, fraction), correct=number >= len(smoothings))
             run = self._compiled(blocks, terms, {"vertices": problem.fixed}).solve(
                 blocks,
                 settings=problem.settings.projection,

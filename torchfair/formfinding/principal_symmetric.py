@@ -25,7 +25,7 @@ class SymmetricLevel:
         principal: Its principal edges, and with them its topology.
         normals: (V, 3) unit normals n(v), see :func:`strip_normals`.
         before, after: Measures of success, see
-            :func:`~torchfair.formfinding.symmetric_report.symmetric_measures`; ``before`` is at the start of the level.
+            :func:`~torchfair.formfinding.symmetric_measures`; ``before`` is at the start of the level.
         runs: Runs of guided projection, in order, in normalised units. Merits fall within a run.
     """
 

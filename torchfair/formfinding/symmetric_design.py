@@ -109,9 +109,9 @@ class SymmetricDesign:
     def solve(self, callback: Callback | None = None) -> bool:
         """Meets the conditions near the current state; returns whether it was stopped by callback or Ctrl-C.
 
-        The shape is found with weighted conditions; then they are met exactly, by the
-        shortest way. Where that fails it is tried again with handles that pull less: they yield to the conditions. A few saddle
-        sides that come out wrong are tried again with a wider margin. The best state found is kept.
+        The shape is found with weighted conditions; then they are met exactly, by the shortest way. Where that fails
+        it is tried again with handles that pull less: they yield to the conditions. A few saddle sides that come out
+        wrong are tried again with a wider margin. The best state found is kept.
         """
         begin, start = len(self.runs), self._state
         if self._is_done():
@@ -182,7 +182,7 @@ class SymmetricDesign:
         return design
 
     def measures(self) -> dict[str, float]:
-        """See :func:`~torchfair.formfinding.symmetric_report.symmetric_measures`."""
+        """See :func:`~torchfair.formfinding.symmetric_measures`."""
         return symmetric_measures(self.vertices, self.principal, self.stars, self.handles, self.targets)
 
     def normals(self) -> Tensor:
