@@ -69,7 +69,8 @@ def cospherical_terms(stars: PrincipalStars, *, weight: float, block: str = "ver
     Args:
         stars: Regular vertices; see :meth:`~torchfair.principal.PrincipalEdges.stars`.
         weight: Dimensionless.
-        block: Name of the vertex block; normals and curvatures are those of :func:`~torchfair.constraints.sphere_blocks`.
+        block: Name of the vertex block; normals and curvatures are in those of
+            :func:`~torchfair.constraints.sphere_blocks`.
     """
     number = torch.arange(stars.vertices.shape[0], device=stars.vertices.device)
     centres, spheres = (column.repeat_interleave(4) for column in (stars.vertices, number))

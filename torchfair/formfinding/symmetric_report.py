@@ -46,10 +46,10 @@ def symmetric_measures(
 
     Returns:
         ``largest_cospherical``, ``mean_cospherical``, ``largest_coplanar``, ``mean_coplanar``: see
-        :func:`~torchfair.formfinding.condition_residuals`; 0 without stars. ``stars``: how many. ``negative_stars``: those with an angle sum
-        above 2 pi. ``saddle_side_share``: share of them whose principal neighbours lie beyond the tangent plane
-        (1 if there are none). ``crossing_pyramids_negative`` and ``crossing_pyramids``: negative stars, and all
-        interior vertices, whose normal pyramid intersects itself. ``normal_variation`` (E) and
+        :func:`~torchfair.formfinding.condition_residuals`; 0 without stars. ``stars``: how many. ``negative_stars``:
+        those with an angle sum above 2 pi. ``saddle_side_share``: share of them whose principal neighbours lie beyond
+        the tangent plane (1 if there are none). ``crossing_pyramids_negative`` and ``crossing_pyramids``: negative
+        stars, and all interior vertices, whose normal pyramid intersects itself. ``normal_variation`` (E) and
         ``total_absolute_curvature`` (C) and their quotient ``energy_over_curvature``; ``mean_edge_length``;
         ``smallest_angle_degrees``; ``largest_handle_distance``.
     """
