@@ -10,7 +10,7 @@ from helpers import DOUBLE
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.geometry import face_normals
+from torchfair.geometry import face_normals, vertex_normals
 from torchfair.reflection import Camera, OrthographicCamera, PerspectiveCamera, Stripes, mirror_directions
 from torchfair.triangulation import triangulate
 
@@ -56,19 +56,31 @@ def ray_cast(vertices: Tensor, topology: Topology, camera: Camera, size: int) ->
 
 
 def exact_functional(
-    vertices: Tensor, topology: Topology, camera: Camera, environment: Stripes, weight: Callable[[Tensor], Tensor]
+    vertices: Tensor,
+    topology: Topology,
+    camera: Camera,
+    environment: Stripes,
+    weight: Callable[[Tensor], Tensor],
+    *,
+    smooth: bool = False,
 ) -> Tensor:
     """Integral over the unit picture of ``weight`` times the first channel of the reflection, nothing being hidden.
 
     Quadrature over every triangle, cut into 16, of degree 5; the points move with the triangle, so that autograd gives
     the exact gradient, the motion of edges included.
     """
-    corners = camera.project(vertices, 1)[0][topology.triangles][..., :2]
+    projected = camera.project(vertices, 1)[0][topology.triangles]
+    corners = projected[..., :2]
     shares, weights = _quadrature(4)
     places = torch.einsum("qk,fkd->fqd", shares, corners)
     (ax, ay), (bx, by) = ((corners[:, k] - corners[:, 0]).unbind(-1) for k in (1, 2))
     areas = (ax * by - ay * bx).abs() / 2
-    rays = mirror_directions(camera.directions_at(places[None], 1)[0], face_normals(vertices, topology)[:, None])
+    normals = face_normals(vertices, topology)[:, None]
+    if smooth:
+        in_space = shares if camera.near is None else shares * -projected[..., 2][:, None]
+        normals = torch.einsum("...qk,fkd->fqd", in_space, vertex_normals(vertices, topology)[topology.triangles])
+        normals = torch.nn.functional.normalize(normals, dim=-1)
+    rays = mirror_directions(camera.directions_at(places[None], 1)[0], normals)
     return (areas[:, None] * weights * environment(rays)[..., 0] * weight(places)).sum()
 
 

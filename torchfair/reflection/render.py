@@ -93,8 +93,28 @@ def render_reflection(
         ShapeError: if a tensor has the wrong shape, or the size is below one pixel.
         TorchfairError: if a vertex is not finite, or for an unknown shading or a supersampling below 1.
     """
+    draw = _checked
+    if torch.compiler.is_compiling():  # left to eager mode: sizes depend on what is seen
+        draw = torch.compiler.disable(_checked)  # type: ignore[no-untyped-call]
+    return draw(vertices, topology, camera, environment, size, supersampling, antialias, shading, normals, background)
+
+
+def _checked(
+    vertices: Tensor,
+    topology: Topology,
+    camera: Camera,
+    environment: Environment,
+    size: Size,
+    supersampling: int,
+    antialias: bool,
+    shading: Shading,
+    normals: Tensor | None,
+    background: Tensor | float,
+) -> Reflection:
     topology.check_vertices(vertices)
     height, width = height_and_width(size)
+    if not bool(torch.isfinite(vertices).all()):
+        raise TorchfairError("a vertex is not finite: pictures need positions without NaN and infinity")
     if shading not in ("flat", "smooth"):
         raise TorchfairError(f'shading must be "flat" or "smooth", got {shading!r}')
     if supersampling < 1:
@@ -104,10 +124,7 @@ def render_reflection(
     else:
         _check_normals(normals, vertices, topology, shading)
     around = Surroundings(camera, (height * supersampling, width * supersampling), environment, background)
-    draw = _pictures
-    if torch.compiler.is_compiling():  # left to eager mode: sizes depend on what is seen
-        draw = torch.compiler.disable(_pictures)  # type: ignore[no-untyped-call]
-    colors, faces = draw(
+    colors, faces = _pictures(
         vertices, topology, normals, around, supersampling, smooth=shading == "smooth", antialias=antialias
     )
     colors = colors.view(*colors.shape[:-2], height, width, -1).movedim(-1, -3)
@@ -118,8 +135,6 @@ def _pictures(
     vertices: Tensor, topology: Topology, normals: Tensor, around: Surroundings, factor: int, **how: bool
 ) -> tuple[Tensor, Tensor]:
     """All pictures, some at a time: (*batch, views, H W, channels + 1), and face numbers of the samples."""
-    if not bool(torch.isfinite(vertices).all()):
-        raise TorchfairError("a vertex is not finite: pictures need positions without NaN and infinity")
     batch, views = vertices.shape[:-2], around.camera.num_views
     meshes, normals = (part.reshape(math.prod(batch), *part.shape[-2:]) for part in (vertices, normals))
     mesh_step, view_step = _steps(meshes.shape[0], views, height_and_width(around.size))
