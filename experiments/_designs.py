@@ -24,9 +24,9 @@ from torchfair.principal import (
     strip_limits,
 )
 from torchfair.shapes import ShapeMesh
-from torchfair.viewing import Camera, EdgeStyle, MeshView
+from torchfair.viewing import Camera, EdgeStyle, MeshView, ViewDirection, fit_camera
 from torchfair.viewing.shading import FRONT, shade_faces
-from torchfair.viewing.sheet import Sheet, points
+from torchfair.viewing.sheet import CAPTION, GAP, MARGIN, Sheet, points
 from torchfair.viewing.wireframe import line_width
 
 Handles = dict[int, list[float]]
@@ -165,8 +165,44 @@ def draw_sheet(sheet: Sheet, strips: DevelopableStrips, left: float, top: float,
     axes.set_axis_off()
     outlines = [outline.numpy() for outline in strips.outlines()]
     colors = strip_colors(strips).numpy()
-    style = {"edgecolors": "#26303d", "linewidths": points(0.8)}
-    axes.add_collection(PolyCollection(outlines, facecolors=colors, **style))
+    drawn = PolyCollection(outlines, facecolors=colors, edgecolors="#26303d", linewidths=points(0.8))
+    axes.add_collection(drawn)
+
+
+def strips_page(level: Level, strips: DevelopableStrips, view: ViewDirection, width: int) -> Sheet:
+    """Strips on the mesh, and beside it laid flat."""
+    half = (width - 2 * MARGIN - GAP) // 2
+    camera = fit_camera(
+        level.vertices, strips.vertices, towards_eye=view.towards_eye, up=view.up, width=half, margin=0.02
+    )
+    across, high = strips.sheet
+    flat = round(half * high / across)
+    height, left = max(camera.height, flat), MARGIN + half + GAP
+    sheet = Sheet(width, CAPTION + height + MARGIN)
+    sheet.caption("strips along the principal edges", MARGIN, 0, half)
+    sheet.image(strips_picture(level, strips, camera), MARGIN, CAPTION + (height - camera.height) // 2)
+    sheet.caption("laid flat", left, 0, half)
+    draw_sheet(sheet, strips, left, CAPTION + (height - flat) / 2, half)
+    return sheet
+
+
+def pulls_page(start: Level, design: Level, handles: Handles, view: ViewDirection, width: int) -> Sheet:
+    """Start and design with their principal edges, and how the handles were pulled."""
+    half = (width - 2 * MARGIN - GAP) // 2
+    camera = fit_camera(
+        start.vertices, design.vertices, towards_eye=view.towards_eye, up=view.up, width=half, margin=0.02
+    )
+    sheet = Sheet(width, CAPTION + camera.height + MARGIN // 2)
+    pulled = list(handles)
+    for column, (name, level) in enumerate({"start": start, "design": design}.items()):
+        mesh, left = MeshView(level.vertices, level.topology, camera), MARGIN + column * (half + GAP)
+        faces = shade_faces(level.vertices, level.topology, camera)
+        picture = mesh.paint(faces, edges=principal_style(mesh, level.principal.mask))
+        seen = visible_vertices(mesh)[pulled]
+        before, after = (vertices[pulled][seen] for vertices in (start.vertices, level.vertices))
+        sheet.caption(name, left, 0, half)
+        sheet.image(mark_pulls(picture, camera, before, after, 0.008 * half), left, CAPTION)
+    return sheet
 
 
 # ---- edges and marks on pictures ---------------------------------------------------------------------------------

@@ -20,27 +20,23 @@ from _designs import (
     Handles,
     Level,
     design_levels,
-    draw_sheet,
     extent,
     largest_pull,
     level_strips,
-    mark_pulls,
     moved,
-    principal_style,
-    strips_picture,
+    pulls_page,
+    strips_page,
     vertex_at,
-    visible_vertices,
 )
 from torch import Tensor
 
 from torchfair.formfinding import SymmetricSettings
 from torchfair.formfinding.symmetric_design import SymmetricDesign
 from torchfair.geometry import gauss_image
-from torchfair.principal import DevelopableStrips, PrincipalEdges, principal_edges_of_lattice
+from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.shapes import Catenoid, ShapeMesh, principal_triangles
 from torchfair.stars import normal_pyramid, pyramid_self_intersections
-from torchfair.viewing import MeshView, fit_camera
-from torchfair.viewing.shading import shade_faces
+from torchfair.viewing import ViewDirection
 from torchfair.viewing.sheet import CAPTION, GAP, MARGIN, Sheet, points
 from torchfair.viewing.sphere import draw_arcs, draw_points, draw_sphere, fit_sphere_view
 
@@ -49,7 +45,7 @@ DESIGN, GAUSS, STRIPS = "design.png", "gauss_image.png", "strips.png"
 FILES = (DESIGN, GAUSS, STRIPS, "start.obj", "design.obj", "strips.obj", "strips.svg")
 SURFACE = Catenoid(1.0, (-1.2, 1.2))
 LOW, HIGH = SURFACE.heights
-EYE, UP = torch.tensor([0.75, -0.85, 0.75]), torch.tensor([0.0, 0.0, 1.0])
+VIEW = ViewDirection(torch.tensor([0.75, -0.85, 0.75]), torch.tensor([0.0, 0.0, 1.0]))
 PYRAMIDS = ((0.0, 0.1), (math.pi / 2, 0.1), (math.pi / 4, 0.6), (math.pi, 0.9))
 """Angles and heights on the start of the vertices whose normal pyramids are drawn."""
 
@@ -92,23 +88,6 @@ def rim_handles(mesh: ShapeMesh, config: Config) -> Handles:
 # ---- pictures ------------------------------------------------------------------------------------------
 
 
-def draw_design(start: Level, design: Level, handles: Handles, config: Config, results: Results) -> None:
-    """Start and design with their principal edges, and how the handles were pulled."""
-    panel = (config.width - 2 * MARGIN - GAP) // 2
-    camera = fit_camera(start.vertices, design.vertices, towards_eye=EYE, up=UP, width=panel, margin=0.02)
-    sheet = Sheet(config.width, CAPTION + camera.height + MARGIN // 2)
-    before = start.vertices[list(handles)]
-    for column, (name, level) in enumerate({"start": start, "design": design}.items()):
-        mesh, left = MeshView(level.vertices, level.topology, camera), MARGIN + column * (panel + GAP)
-        faces = shade_faces(level.vertices, level.topology, camera)
-        picture = mesh.paint(faces, edges=principal_style(mesh, level.principal.mask))
-        after = level.vertices[list(handles)]
-        sheet.caption(name, left, 0, panel)
-        seen = visible_vertices(mesh)[list(handles)]
-        sheet.image(mark_pulls(picture, camera, before[seen], after[seen], 0.008 * panel), left, CAPTION)
-    sheet.write(results.path(DESIGN), overwrite=results.force)
-
-
 def draw_gauss_image(design: Level, chosen: list[int], config: Config, results: Results) -> Report:
     """The whole Gauss image, arcs of self-intersecting pyramids red, and some normal pyramids beside it."""
     vertices, topology = design.vertices, design.topology
@@ -123,7 +102,7 @@ def draw_gauss_image(design: Level, chosen: list[int], config: Config, results: 
         0,
         large,
     )
-    view = fit_sphere_view(image.points, towards_eye=EYE, up=UP)
+    view = fit_sphere_view(image.points, towards_eye=VIEW.towards_eye, up=VIEW.up)
     axes = sheet.axes(MARGIN, CAPTION, large, large)
     draw_sphere(axes, view)
     draw_arcs(axes, view, image.points, image.arcs, points(1.3), 0.8)
@@ -139,29 +118,12 @@ def draw_gauss_image(design: Level, chosen: list[int], config: Config, results: 
 
 def _draw_pyramid(sheet: Sheet, normals: Tensor, left: int, top: int, size: int) -> None:
     """A window on the sphere around one pyramid."""
-    view = fit_sphere_view(normals, towards_eye=normals.sum(0), up=UP)
+    view = fit_sphere_view(normals, towards_eye=normals.sum(0), up=VIEW.up)
     axes = sheet.axes(left, top, size, size)
     draw_sphere(axes, view)
     corner = torch.arange(len(normals))
     draw_arcs(axes, view, normals, torch.stack([corner, corner.roll(-1)], dim=1), points(2.6))
     draw_points(axes, view, normals, points(8))
-
-
-def draw_strips(design: Level, strips: DevelopableStrips, config: Config, results: Results) -> None:
-    """Strips on the mesh, and laid flat below."""
-    panel = config.width - 2 * MARGIN
-    camera = fit_camera(design.vertices, strips.vertices, towards_eye=EYE, up=UP, width=panel // 2, margin=0.02)
-    across, high = strips.sheet
-    flat = panel - panel // 2 - GAP
-    below = round(flat * high / across)
-    height = max(camera.height, below)
-    sheet = Sheet(config.width, CAPTION + height + MARGIN)
-    sheet.caption("strips along the principal edges", MARGIN, 0, camera.width)
-    picture = strips_picture(design, strips, camera)
-    sheet.image(picture, MARGIN, CAPTION + (height - camera.height) // 2)
-    sheet.caption("laid flat", MARGIN + camera.width + GAP, 0, flat)
-    draw_sheet(sheet, strips, MARGIN + camera.width + GAP, CAPTION + (height - below) / 2, flat)
-    sheet.write(results.path(STRIPS), overwrite=results.force)
 
 
 # ---- experiment ----------------------------------------------------------------------------------------
@@ -178,9 +140,9 @@ def experiment(config: Config, results: Results) -> Report:
     results.mesh("start.obj", mesh.vertices, mesh.topology)
     results.mesh("design.obj", design.vertices, design.topology)
     strips, strip_report = level_strips(design, config.strip_height, ("strips.obj", "strips.svg"), results)
-    draw_design(start, design, handles, config, results)
+    pulls_page(start, design, handles, VIEW, config.width).write(results.path(DESIGN), overwrite=results.force)
     gauss = draw_gauss_image(design, [vertex_at(mesh, *place) for place in PYRAMIDS], config, results)
-    draw_strips(design, strips, config, results)
+    strips_page(design, strips, VIEW, config.width).write(results.path(STRIPS), overwrite=results.force)
     pull = {"handles": handles, "largest_pull": largest_pull(mesh.vertices, handles)}
     return {"design": design.report, "strips": strip_report, "gauss_image": gauss, **pull}
 
