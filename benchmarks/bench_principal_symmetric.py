@@ -1,0 +1,300 @@
+"""An edit of a principal-symmetric mesh, one handle moved, in three formulations; and table 20 of the paper.
+
+Run ``python benchmarks/bench_principal_symmetric.py [--cases 480 714 1920] [--formulations spheres eliminated lifted]
+[--threads 1 2] [--repeats 3] [--table 480 714 1920 7680] [--lifted-most 1920] [--json FILE]``.
+
+The mesh has been designed by handles before, so everything is compiled and the conditions are met. Then one handle
+moves on by the length of a mean edge (or ``--move``), and the design answers, several times from the same state, all
+formulations in turn. Meshes: tori of 480 and 1920 vertices drawn into ovals (paper Fig. 14), the annulus of 714
+vertices pulled out of round (Fig. 5). The paper prints sizes, not meshes; its times are those of another machine.
+
+=============  =========================================================================================
+unknowns       all variable blocks
+steps          damped steps of the whole answer, rejected ones too
+to 1e-6        damped steps until the largest relative residual of the vertices stays below 1e-6 (target: 25)
+answer, proc.  seconds of wall and of processor from the call to the return, least of the repetitions
+ms/step        wall time of guided projection over its steps: what a drag feels
+steps/s        steps over seconds of the whole answer, compilation of terms included where a formulation needs it
+               anew (targets: 20 at 480 and 714 vertices, 4 at 1920); ``proc.`` over processor time
+spheres over   time of the answer over that of ``spheres``
+paper over     seconds of a step as printed in table 20 over ours
+residual       largest relative residual at the end; sides: share of right saddle sides
+=============  =========================================================================================
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import math
+import os
+import platform
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+import torchfair
+from torchfair.formfinding import SymmetricSettings
+from torchfair.formfinding.symmetric_design import SymmetricDesign
+from torchfair.formfinding.symmetric_report import condition_residuals
+from torchfair.geometry import edge_lengths
+from torchfair.principal import principal_edges_of_lattice
+from torchfair.projection.layout import State
+from torchfair.shapes import Catenoid, Surface, Torus, principal_triangles
+
+FORMULATIONS = ("spheres", "eliminated", "lifted")
+WANTED = 1e-6
+MOST_STEPS = 25
+Handles = dict[int, list[float]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A mesh, how its handles are pulled first, and what the paper prints for its size.
+
+    Attributes:
+        rows, columns: of the lattice.
+        pulls: away from the axis and along it, in sizes of the mesh, for handles in turn around the axis.
+        at: parameter v of the handles; ``held`` that of vertices that stay, six of them.
+        target: steps per second.
+        figure, variables, seconds: of table 20; thousands of variables, seconds for one iteration.
+    """
+
+    surface: Surface
+    rows: int
+    columns: int
+    pulls: tuple[tuple[float, float], tuple[float, float]]
+    at: float
+    held: float | None
+    target: float | None
+    figure: str
+    variables: int
+    seconds: float
+
+
+RING = Torus(2.0, 0.8)
+OVAL = ((0.15, 0.0), (-0.10, 0.0))
+CASES = {
+    480: Case(RING, 16, 30, OVAL, 0.0, None, 20.0, "14bc", 17, 0.49),
+    714: Case(Catenoid(1.0, (-1.2, 1.2)), 16, 42, ((0.15, 0.05), (-0.10, -0.05)), 1.2, -1.2, 20.0, "5ac", 25, 0.53),
+    1920: Case(RING, 32, 60, OVAL, 0.0, None, 4.0, "14d", 69, 7.07),
+    7680: Case(RING, 64, 120, OVAL, 0.0, None, None, "14e", 23, 6.65),
+}
+
+
+def prepared(case: Case, formulation: str, most_steps: int = 150) -> tuple[SymmetricDesign, Handles]:
+    """The design before its handles are pulled, and where they go first."""
+    mesh = principal_triangles(case.surface, case.rows, case.columns, along="u")
+    vertices = mesh.vertices
+    size = float(torch.linalg.vector_norm(vertices.amax(0) - vertices.amin(0)))
+
+    def vertex(turn: float, v: float) -> int:
+        place = case.surface.position(*torch.tensor([[turn], [v]], dtype=torch.float64))
+        return int(torch.linalg.vector_norm(vertices - place, dim=1).argmin())
+
+    handles = {}
+    for number in range(4):
+        chosen = vertex(number * math.pi / 2, case.at)
+        x, y, z = vertices[chosen].tolist()
+        outwards, upwards = (size * pull for pull in case.pulls[number % 2])
+        stretch = 1.0 + outwards / math.hypot(x, y)
+        handles[chosen] = [stretch * x, stretch * y, z + upwards]
+    if case.held is not None:
+        for number in range(6):
+            chosen = vertex(number * math.pi / 3, case.held)
+            handles[chosen] = vertices[chosen].tolist()
+    settings = SymmetricSettings(formulation=formulation, most_steps=most_steps)
+    principal = principal_edges_of_lattice(mesh, "u")
+    return SymmetricDesign(vertices, principal, handles=list(handles), settings=settings), handles
+
+
+def largest_residual(design: SymmetricDesign, vertices: Tensor) -> float:
+    """Largest relative residual of both conditions."""
+    residuals = condition_residuals(vertices, design.principal, design.stars)
+    return max(float(values.max()) for values in residuals.values() if values.numel())
+
+
+def edited(design: SymmetricDesign, places: Handles) -> tuple[SymmetricDesign, float, float]:
+    """A copy of the design after an edit; wall and processor seconds."""
+    answer = copy.copy(design)  # shares what is compiled
+    answer.runs = []
+    begin, processor = time.perf_counter(), time.process_time()
+    answer.move(places)
+    return answer, time.perf_counter() - begin, time.process_time() - processor
+
+
+def steps_to_residual(design: SymmetricDesign, places: Handles) -> int | None:
+    """Damped steps of the edit until the largest relative residual stays below 1e-6; None if it does not."""
+    answer = copy.copy(design)
+    answer.runs = []
+    problem, seen = answer.problem, [math.inf]
+    admits = problem.admits
+
+    def watched(state: State, trial: State) -> bool:
+        seen[-1] = largest_residual(answer, state["vertices"])  # of the best state after so many steps
+        return admits(state, trial)
+
+    def count(record: torchfair.projection.IterationRecord) -> bool:
+        if record.iteration:
+            seen.append(seen[-1])
+        return False
+
+    problem.admits = watched  # type: ignore[method-assign]
+    try:
+        answer.move(places, count)
+    finally:
+        problem.admits = admits  # type: ignore[method-assign]
+    seen[-1] = largest_residual(answer, answer.vertices)
+    above = [step for step, value in enumerate(seen) if not value < WANTED]
+    return 0 if not above else None if above[-1] + 1 == len(seen) else above[-1] + 1
+
+
+class Edit:
+    """One case in one formulation, designed and ready to be edited again and again."""
+
+    def __init__(self, size: int, formulation: str, move: float) -> None:
+        self.size, self.case, self.formulation = size, CASES[size], formulation
+        self.design, handles = prepared(self.case, formulation)
+        self.design.move(handles)
+        first = next(iter(handles))
+        mean = float(edge_lengths(self.design.vertices, self.design.topology).mean())
+        x, y, z = handles[first]
+        stretch = 1.0 + move * mean / math.hypot(x, y)
+        self.places = {first: [stretch * x, stretch * y, z]}
+        self.wall: list[float] = []
+        self.processor: list[float] = []
+        self.per_step: list[float] = []
+
+    def run(self) -> None:
+        """One edit."""
+        self.answer, wall, processor = edited(self.design, self.places)
+        steps = sum(run.iterations for run in self.answer.runs)
+        self.wall.append(wall)
+        self.processor.append(processor)
+        self.per_step.append(sum(run.timings["total"] for run in self.answer.runs) / max(1, steps))
+
+    def row(self) -> dict[str, object]:
+        """Figures, least of the repetitions."""
+        steps = sum(run.iterations for run in self.answer.runs)
+        measures = self.answer.measures()
+        return {
+            "vertices": self.size,
+            "formulation": self.formulation,
+            "unknowns": sum(block.numel() for block in self.design.problem.blocks(self.design.problem.base).values()),
+            "steps": steps,
+            "steps_to_1e-6": steps_to_residual(self.design, self.places),
+            "answer_s": min(self.wall),
+            "answer_processor_s": min(self.processor),
+            "step_s": min(self.per_step),
+            "largest_residual": largest_residual(self.answer, self.answer.vertices),
+            "saddle_side_share": measures["saddle_side_share"],
+            "largest_handle_distance": measures["largest_handle_distance"],
+            "paper_step_s": self.case.seconds,
+            "target_steps_per_s": self.case.target,
+        }
+
+
+HEADER = f"{'V':>5} {'formulation':12}{'unkn.':>7}{'steps':>6}{'to 1e-6':>8}{'answer':>8}{'proc.':>7}{'ms/step':>8}\
+{'steps/s':>8}{'proc.':>6}{'spheres over':>13}{'paper over':>11}{'residual':>10}{'sides':>7}"
+
+
+def report(row: dict[str, object], spheres: dict[str, object] | None) -> None:
+    """One line of the table."""
+    wall, processor = (row["steps"] / row[kind] for kind in ("answer_s", "answer_processor_s"))
+    reached = row["steps_to_1e-6"]
+    over = f"{row['answer_s'] / spheres['answer_s']:.2f}" if spheres else "-"
+    print(
+        f"{row['vertices']:>5} {row['formulation']:12}{row['unknowns']:>7}{row['steps']:>6}"
+        f"{'never' if reached is None else reached:>8}{row['answer_s']:8.2f}{row['answer_processor_s']:7.2f}"
+        f"{1e3 * row['step_s']:8.1f}{wall:8.1f}{processor:6.1f}{over:>13}{row['paper_step_s'] / row['step_s']:11.1f}"
+        f"{row['largest_residual']:10.1e}{100 * row['saddle_side_share']:6.1f}%",
+        end="",
+    )
+    target = row["target_steps_per_s"]
+    if row["formulation"] == "spheres" and target:
+        quick = reached is not None and reached <= MOST_STEPS
+        print(f"  {verdict(wall >= target)} ({target:.0f}/s), {verdict(quick)} ({MOST_STEPS} steps)", end="")
+    print(flush=True)
+
+
+def verdict(met: bool) -> str:
+    return "met" if met else "MISSED"
+
+
+def edits(sizes: list[int], formulations: list[str], repeats: int, move: float) -> list[dict[str, object]]:
+    """All edits of all cases, formulations in turn."""
+    rows = []
+    for size in sizes:
+        cases = [Edit(size, formulation, move) for formulation in formulations]
+        for _ in range(repeats):
+            for case in cases:
+                case.run()
+        found = {case.formulation: case.row() for case in cases}
+        for row in found.values():
+            report(row, found.get("spheres"))
+        rows += found.values()
+    return rows
+
+
+def table_20(sizes: list[int], formulations: list[str], steps: int, lifted_most: int) -> list[dict[str, object]]:
+    """Variables and seconds of a damped step from the first pull of the handles, beside the paper's."""
+    print(f"\n{'ours':>39}{'paper':>30}\n{'fig.':>5}{'V':>6}{'E':>7}{'F':>7}  {'formulation':12}", end="")
+    print(f"{'variables':>10}{'s/step':>8}{'variables':>11}{'s/step':>8}{'over ours':>11}")
+    rows = []
+    for size in sizes:
+        case = CASES[size]
+        for formulation in formulations:
+            if formulation == "lifted" and size > lifted_most:
+                continue
+            design, handles = prepared(case, formulation, steps)
+            design.move(handles)
+            taken = sum(run.iterations for run in design.runs)
+            seconds = sum(run.timings["total"] for run in design.runs) / taken
+            variables = sum(block.numel() for block in design.problem.blocks(design.problem.base).values())
+            topology = design.topology
+            rows.append({
+                "figure": case.figure, "vertices": topology.num_vertices, "edges": topology.num_edges,
+                "faces": topology.num_faces, "formulation": formulation, "variables": variables, "step_s": seconds,
+                "paper_variables": 1000 * case.variables, "paper_step_s": case.seconds,
+            })  # fmt: skip
+            print(
+                f"{case.figure:>5}{topology.num_vertices:>6}{topology.num_edges:>7}{topology.num_faces:>7}  "
+                f"{formulation:12}{variables:>10}{seconds:8.3f}{case.variables:>10}k{case.seconds:8.2f}"
+                f"{case.seconds / seconds:11.1f}",
+                flush=True,
+            )
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, nargs="*", default=[480, 714, 1920], choices=list(CASES))
+    parser.add_argument("--formulations", nargs="+", default=list(FORMULATIONS), choices=FORMULATIONS)
+    parser.add_argument("--threads", type=int, nargs="+", default=sorted({1, torch.get_num_threads()}))
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--move", type=float, default=1.0, help="of the handle, in mean edges (default: %(default)s)")
+    parser.add_argument("--table", type=int, nargs="*", default=[480, 714, 1920, 7680], help="sizes; none: left out")
+    parser.add_argument("--table-steps", type=int, default=6, help="damped steps in each row (default: %(default)s)")
+    parser.add_argument("--lifted-most", type=int, default=1920, help="largest size in the paper's variables")
+    parser.add_argument("--json", type=Path, help="write the figures to this file")
+    options = parser.parse_args()
+    machine = platform.processor() or platform.machine()
+    print(f"{machine}, torch {torch.__version__}, load {os.getloadavg()[0]:.1f}; seconds")
+    document: dict[str, object] = {"torchfair": torchfair.__version__, "torch": torch.__version__}
+    document["load"] = os.getloadavg()
+    for threads in options.threads:
+        torch.set_num_threads(threads)
+        print(f"\n{threads} thread(s), load {os.getloadavg()[0]:.1f}\n{HEADER}")
+        document[f"edits_{threads}"] = edits(options.cases, options.formulations, options.repeats, options.move)
+    document["table_20"] = table_20(options.table, options.formulations, options.table_steps, options.lifted_most)
+    print(f"load at the end {os.getloadavg()[0]:.1f}")
+    if options.json:
+        options.json.write_text(json.dumps(document, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
