@@ -62,7 +62,7 @@ class Camera(ABC):
 
     @abstractmethod
     def directions_at(self, pixels: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
-        """Unit directions (views, *any, 3) from the eye into the scene at places (views, *any, 2) of the picture.
+        """Unit directions ``(views, *any, 3)`` from the eye through places ``(views, *any, 2)`` of the picture.
 
         With ``view`` (N,), the number of the view of each place: (N, 3) at places (N, 2).
         """

@@ -103,7 +103,7 @@ class OrthographicCamera(Camera):
         return torch.stack([width / 2 + scale * right, height / 2 - scale * up, forward], dim=-1)
 
     def directions_at(self, pixels: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
-        """The direction of each view, repeated for every place ``(views, *any, 2)``: (views, *any, 3)."""
+        """The direction of each view, repeated for every place ``(views, *any, 2)``: ``(views, *any, 3)``."""
         directions = self.directions.to(pixels)
         if view is not None:
             return directions[view]

@@ -102,7 +102,7 @@ class PerspectiveCamera(Camera):
         return torch.stack([width / 2 + scale * right, height / 2 - scale * up, -inverse], dim=-1)
 
     def directions_at(self, pixels: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
-        """Unit directions of the rays through places ``(views, *any, 2)`` of the picture: (views, *any, 3)."""
+        """Unit directions of the rays through places ``(views, *any, 2)`` of the picture: ``(views, *any, 3)``."""
         height, width = height_and_width(size)
         axes, scale = self.axes.to(pixels), self._pixels_per_slope(width).to(pixels)[:, None]
         if view is None:
