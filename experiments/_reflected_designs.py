@@ -45,9 +45,9 @@ def smooth_surface(vertices: Tensor, topology: Topology, times: int) -> SmoothRe
     return SmoothReference.of_mesh(vertices, topology)
 
 
-def reflection_scores(meshes: dict[str, Mesh], reference: SmoothReference) -> Report:
-    """E and the reflection score of every mesh."""
-    setup = ReflectionSetup.for_reference(reference)
+def reflection_scores(meshes: dict[str, Mesh], reference: SmoothReference, size: int) -> Report:
+    """E and the reflection score of every mesh, from pictures of ``size`` pixels along each side."""
+    setup = ReflectionSetup.for_reference(reference, size=size)
     table: Report = {}
     for name, (vertices, topology) in meshes.items():
         score = reflection_score(vertices, topology, setup)

@@ -52,6 +52,7 @@ class Config(ExperimentConfig):
     levels: int = setting(1, "how often the design is refined", least=0)
     smooth: int = setting(2, "how often the finest level is refined for the smooth reference", least=0)
     frequency: float = setting(1.2, "stripe pairs per unit of the mirrored direction", least=0.1)
+    size: int = setting(256, "rows and columns of the pictures that are scored", least=32)
     joints: float = setting(0.35, "opacity of the joints between panels", least=0.0)
     width: int = setting(2200, "columns of pixels of rendered pictures", least=300)
 
@@ -106,7 +107,7 @@ def experiment(config: Config, results: Results) -> Report:
 
     reference = smooth_surface(levels[-1].vertices, levels[-1].topology, config.smooth)
     meshes = {f"{level.topology.num_vertices} vertices": (level.vertices, level.topology) for level in levels}
-    scores = reflection_scores(meshes, reference)
+    scores = reflection_scores(meshes, reference, config.size)
     captions = {
         name: [f"$E$ = {row['normal_variation']:.2f}", f"score {row['score']:.3f}"] for name, row in scores.items()
     }
