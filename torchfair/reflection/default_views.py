@@ -9,7 +9,7 @@ from torch import Tensor
 
 from ..geometry import face_area_vectors
 from ..geometry._ops import norm
-from ._camera_fit import look_axes
+from ..rasterisation.camera_fit import look_axes
 from .orthographic_camera import OrthographicCamera
 from .smooth_reference import SmoothReference
 from .view_directions import axis_directions, cone_directions

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from ._camera_fit import check_frame, fit_windows, look_axes, points_to_fit
+from ..rasterisation.camera_fit import check_frame, fit_windows, look_axes, points_to_fit
 from .camera import Camera, Size, camera_rows, fill_attributes, height_and_width, positive_numbers, unit_directions
 
 

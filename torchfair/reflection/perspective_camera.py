@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ..errors import TorchfairError
-from ._camera_fit import check_frame, fit_eyes, look_axes, points_to_fit
+from ..rasterisation.camera_fit import check_frame, fit_eyes, look_axes, points_to_fit
 from .camera import Camera, Size, camera_rows, fill_attributes, height_and_width, positive_numbers, unit_directions
 from .orthographic_camera import OrthographicCamera
 

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError, TorchfairError
-from ._camera_fit import look_axes
+from ..rasterisation.camera_fit import look_axes
 
 
 def axis_directions(rotation: Tensor | None = None) -> Tensor:

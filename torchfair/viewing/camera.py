@@ -9,6 +9,8 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError
+from ..rasterisation.camera_fit import fit_eyes, points_to_fit
+from ..rasterisation.camera_fit import look_axes as axes_of_views
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +87,8 @@ def fit_camera(
         ShapeError: if ``towards_eye`` is zero or the picture has no pixels.
     """
     axes = look_axes(towards_eye, up)
-    points = torch.cat([v.detach().reshape(-1, 3).to(axes) for v in vertices]) if vertices else axes.new_zeros(0, 3)
-    points = points[torch.isfinite(points).all(-1)]
-    local = (points if points.shape[0] else axes.new_zeros(1, 3)) @ axes.T
+    points = points_to_fit(vertices)
+    local = points @ axes.T
     if height is None:
         height = _natural_height(local, width)
     if width < 1 or height < 1:
@@ -101,8 +102,11 @@ def fit_camera(
         sides = torch.stack([2 * half[0] / width, 2 * half[1] / height])
         scale = usable / max(float(sides.max()), 1e-6 * reach / max(width, height))
         return Camera(centre @ axes, axes, scale, False, width, height)
-    eye, slope = _perspective_eye(local, width, height, field_of_view, usable, reach)
-    return Camera(eye @ axes, axes, max(width, height) / (2 * slope), True, width, height)
+    slope = math.tan(math.radians(field_of_view) / 2)
+    forward = axes * axes.new_tensor([1.0, 1, -1])[:, None]
+    side = axes.new_tensor([slope * width / max(width, height)])
+    eyes, _ = fit_eyes(points, forward[None], side, margin, width / height)
+    return Camera(eyes[0], axes, max(width, height) / (2 * slope), True, width, height)
 
 
 def look_axes(towards_eye: Tensor, up: Tensor) -> Tensor:
@@ -112,38 +116,10 @@ def look_axes(towards_eye: Tensor, up: Tensor) -> Tensor:
         ShapeError: if ``towards_eye`` is zero.
     """
     back = torch.as_tensor(towards_eye, dtype=torch.float64)
-    length = torch.linalg.vector_norm(back)
-    if not length > 0:
+    if not torch.linalg.vector_norm(back) > 0:
         raise ShapeError("towards_eye", "a direction (3,) that is not zero", back.tolist())
-    back = back / length
-    right = torch.linalg.cross(torch.as_tensor(up, dtype=torch.float64), back)
-    if torch.linalg.vector_norm(right) < 1e-9:
-        other = torch.zeros(3, dtype=torch.float64)
-        other[back.abs().argmin()] = 1
-        right = torch.linalg.cross(other, back)
-    right = right / torch.linalg.vector_norm(right)
-    return torch.stack([right, torch.linalg.cross(back, right), back])
-
-
-def _perspective_eye(
-    local: Tensor, width: int, height: int, field_of_view: float, usable: float, reach: float
-) -> tuple[Tensor, float]:
-    """The closest eye, in camera axes, from which all points lie inside the usable part of the picture.
-
-    A point is inside the left and right planes if ``|x - eye_x| <= t (eye_z - z)``, so the extremes of
-    ``x + t z`` and ``-x + t z`` give the eye; likewise upwards.
-    """
-    slope = math.tan(math.radians(field_of_view) / 2)
-    eye = local.new_zeros(3)
-    distances = []
-    for axis, pixels in ((0, width), (1, height)):
-        t = slope * usable * pixels / max(width, height)
-        high = (local[:, axis] + t * local[:, 2]).amax()
-        low = (-local[:, axis] + t * local[:, 2]).amax()
-        eye[axis] = (high - low) / 2
-        distances.append((high + low) / (2 * t))
-    eye[2] = torch.stack([*distances, local[:, 2].amax() + 0.05 * reach]).amax()
-    return eye, slope
+    axes = axes_of_views(-back[None], torch.as_tensor(up, dtype=torch.float64)[None])[0]
+    return axes * axes.new_tensor([1.0, 1, -1])[:, None]
 
 
 def _natural_height(local: Tensor, width: int) -> int:
