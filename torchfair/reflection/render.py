@@ -63,9 +63,9 @@ def render_reflection(
 
     **Pixels.** Samples are taken at the centres of ``supersampling``^2 squares in each pixel and averaged.
     With ``antialias`` each of these squares shows the mean over the faces in it instead, weighted by the exact areas
-    that they cover, hidden parts cut away: exact to 1e-7 but where faces penetrate each other, for faces up to 1e7 times
-    as large as the picture. For a face its colour at the centre of the square counts. Pictures are the same at every
-    call; on GPUs, sums over the edges in a pixel may differ in the last bits.
+    that they cover, hidden parts cut away: exact to 1e-7, but where faces penetrate each other, and for faces up to
+    1e7 times as large as the picture. For a face its colour at the centre of the square counts. Pictures are the same
+    at every call; on GPUs, sums over the edges in a pixel may differ in the last bits.
 
     **Gradients** with respect to vertices, normals and parameters of the environment are those of the image with
     ``antialias``, whether it is asked for or not: exact derivatives of areas and colours, which follow the motion of
