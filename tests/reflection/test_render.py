@@ -349,3 +349,18 @@ def test_grid_on_pixel_centres_and_borders_is_covered_once() -> None:
             assert -1e-6 < float(mean.coverage.min()) <= float(mean.coverage.max()) < 1 + 1e-6
             colour = mean.image.amax((-1, -2), keepdim=True)
             assert torch.allclose(mean.image, mean.coverage[:, None] * colour, atol=1e-6)
+
+
+@pytest.mark.parametrize("scene", [torus, lambda: random_polytope(3), cube], ids=["torus", "polytope", "cube"])
+@each_kind
+@pytest.mark.parametrize("size", [1, 4])
+def test_antialiased_pixels_are_the_limit_of_many_samples(scene, kind: type[OrthographicCamera], size: int) -> None:  # type: ignore[no-untyped-def]
+    """Whole bodies that hide themselves, in one pixel or a few."""
+    vertices, topology = scene()
+    camera = kind.fit(vertices, directions=VIEWS)
+    mean = render_reflection(vertices, topology, camera, STRIPES, size=size, antialias=True)
+    samples = render_reflection(vertices, topology, camera, STRIPES, size=size, supersampling=600 // size)
+    row = size / 600  # of samples: what an edge along the rows may be off by
+    assert torch.allclose(mean.coverage, samples.coverage, atol=row)
+    if camera.near is None:
+        assert torch.allclose(mean.image, samples.image, atol=row)
