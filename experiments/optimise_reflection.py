@@ -2,8 +2,9 @@
 
 An irregular triangle mesh; inner vertices glide on the surface through their two parameters, the boundary is fixed.
 Three losses by the same number of steps of Adam: the reflection loss (1 - SSIM over six views and four stripe
-directions, and a share of the reflection variation), its first part alone, and the energy E alone. All are judged by
-the reflection score in the same views and in six others, by E, and by flipped faces.
+directions, and a share of the reflection variation), its first part alone, and the energy E alone, each with a penalty
+on corner angles below 20 degrees. All are judged by the reflection score in the same views and in six others, by E, and
+by flipped faces.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from _layouts import IRREGULAR, SADDLES, layout
 from _mirrors import Mirror, mirror_picture, panel_width, panels, smooth_mirror, striped
 from torch import Tensor
 
+from torchfair import Topology
 from torchfair.energies import normal_variation
 from torchfair.geometry import angles, face_normals
 from torchfair.reflection import (
@@ -53,6 +55,8 @@ class Config(ExperimentConfig):
     steps: int = setting(100, "steps of every optimisation", least=1)
     rate: float = setting(0.02, "learning rate, in edge lengths", least=1e-6)
     weight: float = setting(0.1, "weight of the variation", least=0)
+    shape: float = setting(10.0, "weight of the penalty on small angles, 0 for none", least=0)
+    smallest_angle: float = setting(20.0, "angles in degrees below which it acts", least=0.1)
     size: int = setting(128, "pixels along a picture while optimising", least=32)
     judged_size: int = setting(256, "pixels along the pictures by which meshes are judged", least=32)
     every: int = setting(10, "steps between measurements", least=1)
@@ -132,6 +136,12 @@ def optimise(
     return history
 
 
+def small_angles(vertices: Tensor, topology: Topology, degrees: float) -> Tensor:
+    """Sum of ``(1 - angle / degrees)^2`` over the corners with smaller angles, divided by the number of vertices."""
+    short = torch.relu(1 - angles.corner_angles(vertices, topology) / math.radians(degrees))
+    return short.square().sum() / topology.num_vertices
+
+
 def run_surface(name: str, config: Config) -> tuple[dict[str, Report], dict[str, Tensor], SmoothReference, ShapeMesh]:
     """All losses on one surface: figures and positions by loss."""
     reference = SmoothReference.of_surface(SADDLES[name])
@@ -139,11 +149,15 @@ def run_surface(name: str, config: Config) -> tuple[dict[str, Report], dict[str,
     others = other_views(setup)
     mesh = layout(SADDLES[name], IRREGULAR, config.rows, config.seed)
     both = ReflectionLoss(mesh.topology, setup, variation_weight=config.weight, size=config.size)
-    losses = {BOTH: both, SCORE: both.dissimilarity, ENERGY: lambda v: normal_variation(v, mesh.topology)}
+    losses = {BOTH: both, SCORE: both.dissimilarity, ENERGY: both.variation}
     report, positions = {}, {START: mesh.vertices}
     for kind, loss in losses.items():
         model = GlidingMesh(mesh, config.rows)
-        history = optimise(model, loss, lambda m=model: measure(m, setup, others), config)
+
+        def total(vertices: Tensor, loss: Callable[[Tensor], Tensor] = loss) -> Tensor:
+            return loss(vertices) + config.shape * small_angles(vertices, mesh.topology, config.smallest_angle)
+
+        history = optimise(model, total, lambda m=model: measure(m, setup, others), config)
         first, last = history[0], history[-1]
         changes = {f"{key}_change": float(last[key] / first[key]) - 1
                    for key in ("score", "score_in_other_views", "normal_variation", "wobble")}  # fmt: skip

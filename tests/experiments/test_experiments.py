@@ -252,6 +252,7 @@ def test_vertices_slide_until_reflections_are_smoother_without_folding(run: Run,
     assert both["score_change"] < energy["score_change"]
     assert both["normal_variation_change"] < 0
     assert both["end"]["flipped_faces"] == 0
+    assert both["end"]["smallest_angle_degrees"] > 10
     start, end = (load_mesh(tmp_path / "out" / name) for name in ("start.obj", "reflection.obj"))
     boundary = start.topology.is_boundary_vertex
     assert torch.equal(start.vertices[boundary], end.vertices[boundary])

@@ -29,7 +29,11 @@ class ReflectionLoss(MeshModule):
 
     The second part is ``variation_weight`` times the mean dual reflection variation over the six axis directions,
     4/3 E, divided by the square root of the area (of the reference if there is one): dimensionless. Pictures are rough
-    functions of the vertices, and this part helps them along; alone it makes slivers and creases.
+    functions of the vertices, and this part helps them along; alone it makes slivers and creases. Neither cares for the
+    shape of triangles.
+
+    Batches are leading dimensions of the vertices; ``torch.func.vmap`` does not apply, because what is seen where
+    depends on the values.
 
     Args:
         topology: connectivity of all meshes that the module is called with.
