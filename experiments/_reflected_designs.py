@@ -18,7 +18,7 @@ from torchfair.viewing import Camera, ViewDirection, fit_camera
 Mesh = tuple[Tensor, Topology]
 SMOOTH = "smooth reference"
 WAVES = torch.tensor([0.6, 0.35, 0.8])
-_PANEL = 0.75  # height over width
+_PANEL = 0.68  # height over width
 
 
 class Look(Protocol):

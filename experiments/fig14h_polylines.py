@@ -36,7 +36,7 @@ from torchfair.viewing import ViewDirection
 NAME = "fig14h_polylines"
 DESIGN, REFLECTIONS = "design.png", "reflections.png"
 SURFACE = Torus(2.0, 0.8)
-CIRCLES = {0.0: (3.7, 0.0), math.pi / 2: (1.75, 1.08), math.pi: (1.0, 0.0), 3 * math.pi / 2: (1.75, -1.08)}
+CIRCLES = {0.0: (3.6, 0.0), math.pi / 2: (1.6, 0.95), math.pi: (1.0, 0.0), 3 * math.pi / 2: (1.6, -0.95)}
 """Radius and height that the circle of each tube angle is pulled to."""
 VIEW = ViewDirection(torch.tensor([0.35, -0.9, 1.1]), torch.tensor([0.0, 0.0, 1.0]))
 
@@ -47,10 +47,10 @@ class Config(ExperimentConfig):
 
     around: int = setting(30, "cells around the axis", least=6)
     rows: int = setting(16, "rows of triangles around the tube; a multiple of four", least=8)
-    spacing: int = setting(3, "every so many vertices of a circle there is a handle", least=1)
+    spacing: int = setting(1, "every so many vertices of a highlighted circle there is a handle", least=1)
     energy_weight: float = setting(0.03, "weight of E", least=0)
     levels: int = setting(1, "how often the design is refined", least=0)
-    smooth: int = setting(2, "how often the finest level is refined for the smooth reference", least=0)
+    smooth: int = setting(1, "how often the finest level is refined for the smooth reference", least=0)
     frequency: float = setting(1.2, "stripe pairs per unit of the mirrored direction", least=0.1)
     size: int = setting(256, "rows and columns of the pictures that are scored", least=32)
     joints: float = setting(0.35, "opacity of the joints between panels", least=0.0)
