@@ -3,6 +3,7 @@
 from .absolute_curvature import absolute_curvature_terms as absolute_curvature_terms
 from .along_directions import along_directions as along_directions
 from .barrier import barrier as barrier
+from .boundary_bending import boundary_bending_terms as boundary_bending_terms
 from .closeness import closeness_terms as closeness_terms
 from .closeness import distance_limit_terms as distance_limit_terms
 from .element_quality import corner_angle_terms as corner_angle_terms
@@ -24,4 +25,5 @@ from .saddle_sides import SaddleSides as SaddleSides
 from .stars import pyramid_terms as pyramid_terms
 from .stars import saddle_terms as saddle_terms
 from .tangent_planes import BoundaryNormals as BoundaryNormals
+from .tangent_planes import tangent_patch_terms as tangent_patch_terms
 from .tangent_planes import tangent_plane_terms as tangent_plane_terms

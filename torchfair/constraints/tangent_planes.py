@@ -13,27 +13,34 @@ from ..geometry._ops import scatter_sum
 from ..geometry.normals import normalise
 from ..projection import ElementTerm
 from ..topology import Topology
+from .boundary_jets import BoundaryJets, slopes_of_patch
 from .star_stencils import open_star_stencils
 
+NAME = "tangent planes"
 _LARGEST_SHARE = 0.8
+_STEEPEST = 0.3  # tangent of the angle up to which a patch is turned
+_SMOOTH = 0.02  # mean misfit of a patch over its reach: more is a crease
 
 
 class BoundaryNormals(NamedTuple):
     """What normals at the boundary of a mesh look like from inside.
 
     The normal of an open star is that of the surface near the centroid of its faces, not at the boundary vertex.
-    Along a line from the boundary inwards normals change linearly to first order, so the normal at the boundary is
-    ``(star - share * inner) / (1 - share)``.
+    Where the surface is smooth, the normal at the vertex is that of a quadratic patch through the vertices around
+    (:class:`BoundaryJets`). Elsewhere it is extrapolated: along a line from the boundary inwards normals change
+    linearly to first order, so it is ``(star - share * inner) / (1 - share)``.
 
     Attributes:
         star: (V, 3) unit normals of the sums of area vectors around vertices.
         inner: (V, 3) mean of the star normals of neighbours inside.
         share: (V,) how far the centroid of the star is on the way to them, 0 to 0.8; 0 where there are none.
+        at_boundary: (V, 3) unit normals at boundary vertices; zero inside.
     """
 
     star: Tensor
     inner: Tensor
     share: Tensor
+    at_boundary: Tensor
 
     @classmethod
     def of(cls, vertices: Tensor, topology: Topology) -> BoundaryNormals:
@@ -60,16 +67,26 @@ class BoundaryNormals(NamedTuple):
         share = (centroid * inwards).sum(1) / (inwards * inwards).sum(1).clamp_min(1e-300)
         has_inside = scatter_sum(inside[others], ends, count)[:, 0] > 0
         share = torch.where(has_inside, share.clamp(0.0, _LARGEST_SHARE), torch.zeros_like(share))
-        return cls(star, mean_inside(star), share)
-
-    def at_boundary(self) -> Tensor:
-        """(V, 3) unit normals extrapolated to the vertices."""
-        return normalise(self.star - self.share[:, None] * self.inner, 0.0)
+        extrapolated = normalise(star - share[:, None] * mean_inside(star), 0.0)
+        return cls(star, mean_inside(star), share, _at_boundary(vertices, topology, extrapolated))
 
     def star_targets(self, normals: Tensor) -> Tensor:
         """(V, 3) unit star normals that belong to prescribed unit ``normals`` (V, 3) at the vertices."""
         share = self.share[:, None]
         return normalise((1.0 - share) * normals + share * self.inner, 0.0)
+
+
+def _at_boundary(vertices: Tensor, topology: Topology, extrapolated: Tensor) -> Tensor:
+    """Normals (V, 3) of patches at boundary vertices where these fit, else the ``extrapolated`` ones (V, 3)."""
+    chosen = torch.nonzero(topology.is_boundary_vertex & (extrapolated != 0.0).any(1)).squeeze(1)
+    result = torch.zeros_like(extrapolated)
+    if chosen.numel():
+        normals = extrapolated[chosen]
+        first, second = tangent_frames(normals)
+        jets = BoundaryJets.of(vertices, topology, chosen, normals, (first, second))
+        found = normals - jets.slopes[:, :1] * first - jets.slopes[:, 1:] * second
+        result[chosen] = torch.where((jets.misfit < _SMOOTH)[:, None], normalise(found, 0.0), normals)
+    return result
 
 
 def tilt(x: Tensor, first: Tensor, second: Tensor) -> Tensor:
@@ -102,7 +119,37 @@ def tangent_plane_terms(
     terms = []
     for chosen, stencil in open_star_stencils(topology, vertices):
         data = (first[chosen], second[chosen])
-        terms.append(ElementTerm("tangent planes", tilt, [(block, stencil)], data=data, weight=weight))
+        terms.append(ElementTerm(NAME, tilt, [(block, stencil)], data=data, weight=weight))
+    return terms
+
+
+def tangent_patch_terms(
+    vertices: Tensor, topology: Topology, chosen: Tensor, normals: Tensor, *, weight: float, block: str = "vertices"
+) -> list[ElementTerm]:
+    """Turns the surface at boundary vertices until quadratic patches there are orthogonal to given unit normals.
+
+    More exact than :func:`tangent_plane_terms`, but only near a solution: patches are frozen in the plane. Where they
+    do not fit or the surface is far from the prescribed plane, the stars are turned instead.
+
+    Args:
+        vertices: (V, 3) near which the terms are used.
+        topology: Triangle mesh.
+        chosen: (n,) numbers of boundary vertices.
+        normals: (n, 3) unit normals of the surface.
+        weight: Dimensionless.
+        block: Name of the vertex block.
+    """
+    jets = BoundaryJets.of(vertices, topology, chosen, normals, tangent_frames(normals))
+    fits = (jets.misfit < _SMOOTH) & (vector_norm(jets.slopes, dim=1) < _STEEPEST)
+    terms = []
+    if bool(fits.any()):
+        stencil, data = [(block, jets.stencil[fits])], (jets.weights[fits], normals[fits])
+        terms.append(ElementTerm(NAME, slopes_of_patch, stencil, data=data, weight=weight, linear=True))
+    if not bool(fits.all()):
+        prescribed = torch.zeros_like(vertices)
+        prescribed[chosen] = normals
+        targets = BoundaryNormals.of(vertices, topology).star_targets(prescribed)[chosen]
+        terms += tangent_plane_terms(topology, chosen[~fits], targets[~fits], weight=weight, block=block)
     return terms
 
 

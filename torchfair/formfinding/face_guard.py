@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from torch import Tensor
 
-from ..geometry import face_area_vectors
+from ..geometry import corner_angles, face_area_vectors
 from ..geometry._ops import dot
 from ..projection.layout import State
 from ..topology import Topology
@@ -20,15 +20,20 @@ class FaceGuard:
     Args:
         topology: Of the mesh.
         place: The vertices (V, 3) of a state.
+        least_angle: Refuses also steps that lead to a smaller corner angle, radians.
     """
 
-    def __init__(self, topology: Topology, place: Callable[[State], Tensor]) -> None:
-        self._topology, self._place = topology, place
+    def __init__(self, topology: Topology, place: Callable[[State], Tensor], least_angle: float = 0.0) -> None:
+        self._topology, self._place, self._least_angle = topology, place, least_angle
         self._known: list[tuple[State, Tensor]] = []
 
     def __call__(self, state: State, trial: State) -> bool:
         """Whether every face of the trial is seen from the side it is seen from in the state."""
-        return bool((dot(self._areas(state), self._areas(trial)) > 0.0).all())
+        if not bool((dot(self._areas(state), self._areas(trial)) > 0.0).all()):
+            return False
+        if self._least_angle <= 0.0:
+            return True
+        return bool((corner_angles(self._place(trial), self._topology) >= self._least_angle).all())
 
     def _areas(self, state: State) -> Tensor:
         for known, areas in self._known:

@@ -23,6 +23,7 @@ from .form_settings import FormSettings
 if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
 
+_EXACTLY = 10.0  # weight of tangent planes in the end, over that on the way
 _EVENED = 0.2  # of the extent of the mesh
 _LEAST_LENGTH = 1e-2  # of a mean of unit normals that still has a direction
 _LEAST_SMOOTHING = 1e-4  # mean edge lengths: where a flat start has nothing to measure it by
@@ -59,7 +60,6 @@ class FormProblem:
         gliding = settings.boundary == "glide"
         self.fixed = staying_vertices(topology, track, settings)
         self.normals = normals
-        self._star_targets: Tensor | None = None
         self._conditions = c.handle_terms(handles, targets, weight=settings.handle_weight)
         if settings.umbrella_weight:
             self._conditions += c.interior_fairness_terms(topology, weight=settings.umbrella_weight)
@@ -86,10 +86,11 @@ class FormProblem:
         return ways
 
     def height_terms(
-        self, vertices: Tensor, directions: Tensor, smoothing: float, fairness_weight: float
+        self, vertices: Tensor, directions: Tensor, smoothing: float, fairness_weight: float, *, correct: bool = False
     ) -> list[ElementTerm]:
         """Terms whose unknowns are heights along the directions; the boundary stays."""
-        terms = [*self._curvature(smoothing), *self._others(vertices, fairness_weight)]
+        others = self._others(vertices, fairness_weight, correct=correct)
+        terms = [*self._curvature(smoothing), *self._bending(smoothing), *others]
         return [c.along_directions(term, vertices, directions) for term in terms]
 
     def _evened(self, normals: Tensor) -> Tensor:
@@ -116,12 +117,12 @@ class FormProblem:
             return {"vertices": vertices}
         return {"vertices": vertices, **lifted_absolute_curvature_blocks(vertices, self.topology)}
 
-    def terms(self, vertices: Tensor, smoothing: float, *, correct: bool = False) -> list[ElementTerm]:
+    def terms(self, vertices: Tensor, smoothing: float) -> list[ElementTerm]:
         """Terms whose unknowns are the vertices, or those of the lifted formulation; ``vertices`` are the start."""
         settings = self.settings
-        others = [*self._others(vertices, settings.fairness_weight, correct=correct), *self._in_space]
+        others = [*self._others(vertices, settings.fairness_weight), *self._in_space]
         if settings.formulation == "reduced":
-            return [*self._curvature(smoothing), *others]
+            return [*self._curvature(smoothing), *self._bending(smoothing), *others]
         lifted = lifted_absolute_curvature_terms(
             self.topology,
             smoothing=smoothing,
@@ -129,6 +130,28 @@ class FormProblem:
             constraint_weight=settings.constraint_weight,
         )
         return [*lifted, *others]
+
+    @cached_property
+    def fixed_in_space(self) -> Tensor:
+        """(V,) bool, vertices that stay while others are spread.
+
+        Next to prescribed tangent planes they all do: it would be easier to crowd them at the boundary, where stars are
+        turned by little moves, than to bend the surface.
+        """
+        if not self.keeps_rows:
+            return self.fixed
+        v, w = self.topology.edges.unbind(1)
+        prescribed = (self.normals != 0.0).any(1)
+        held = self.fixed.clone()
+        held[w[prescribed[v]]] = True
+        held[v[prescribed[w]]] = True
+        return held
+
+    @property
+    def keeps_rows(self) -> bool:
+        """Whether vertices next to prescribed tangent planes move along normals only."""
+        settings = self.settings
+        return self.has_tangent_planes and settings.boundary == "fixed" and settings.formulation == "reduced"
 
     @property
     def has_tangent_planes(self) -> bool:
@@ -144,13 +167,25 @@ class FormProblem:
 
     def has_collapsed(self, vertices: Tensor, start: Tensor) -> bool:
         """Whether a corner angle is smaller than the settings allow and than half the smallest of the start."""
-        smallest, before = (float(corner_angles(x, self.topology).min()) for x in (vertices, start))
-        return smallest < min(self.settings.least_angle, 0.5 * before)
+        return self._smallest_angle(vertices) < self.least_angle(start)
+
+    def least_angle(self, start: Tensor) -> float:
+        """Smallest corner angle, radians, that is not a collapse from this start."""
+        return min(self.settings.least_angle, 0.5 * self._smallest_angle(start))
+
+    def _smallest_angle(self, vertices: Tensor) -> float:
+        return float(corner_angles(vertices, self.topology).min())
 
     # ---- terms -----------------------------------------------------------------------------------------
 
     def _curvature(self, smoothing: float) -> list[ElementTerm]:
         return c.absolute_curvature_terms(self.topology, smoothing=smoothing, weight=self.settings.curvature_weight)
+
+    def _bending(self, smoothing: float) -> list[ElementTerm]:
+        if not self.has_tangent_planes:
+            return []
+        weight = self.settings.curvature_weight
+        return c.boundary_bending_terms(self.topology, self.normals, smoothing=smoothing, weight=weight)
 
     def _others(self, vertices: Tensor, fairness_weight: float, *, correct: bool = False) -> list[ElementTerm]:
         """Fairness and conditions, the former and tangent planes as seen from ``vertices``."""
@@ -164,10 +199,12 @@ class FormProblem:
         chosen = torch.nonzero((self.normals != 0.0).any(1)).squeeze(1)
         if not chosen.numel():
             return []
-        before = self._star_targets if correct else None
-        targets = c.BoundaryNormals.of(vertices, self.topology).star_targets(self.normals, before)
-        self._star_targets = targets
-        return c.tangent_plane_terms(self.topology, chosen, targets[chosen], weight=self.settings.tangent_weight)
+        weight = self.settings.tangent_weight
+        if correct:
+            exactly = _EXACTLY * weight
+            return c.tangent_patch_terms(vertices, self.topology, chosen, self.normals[chosen], weight=exactly)
+        targets = c.BoundaryNormals.of(vertices, self.topology).star_targets(self.normals)
+        return c.tangent_plane_terms(self.topology, chosen, targets[chosen], weight=weight)
 
     def _gliding(self, track: BoundaryTrack, normalisation: Normalisation) -> list[ElementTerm]:
         lines, closed = track.polylines()

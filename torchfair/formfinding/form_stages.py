@@ -69,7 +69,8 @@ class FormStages:
             start = found[-1][0]
             if stopped(found[-1][1]):
                 return
-        yield from self._in_space(start, last)
+        # Next to prescribed tangent planes, vertices that are already spread stay so: ridges would draw them in.
+        yield from self._in_space(start, [] if self.problem.keeps_rows else last)
 
     def _is_doubtful(self, found: Sequence[Stage], start: Tensor) -> bool:
         converged = all(run.status.converged for _, run in found)
@@ -85,26 +86,32 @@ class FormStages:
 
     def _in_space(self, vertices: Tensor, smoothings: Sequence[float]) -> Iterator[Stage]:
         problem = self.problem
-        # What tangent planes ask of stars depends on the surface inside: it is seen anew in every stage.
-        rounds = _TANGENT_ROUNDS if problem.has_tangent_planes else 0
-        for number, fraction in enumerate([*smoothings, *[smoothings[-1]] * rounds]):
+        for fraction in smoothings:
             blocks = problem.blocks(vertices)
-            terms = problem.terms(vertices, problem.smoothing(vertices, fraction), correct=number >= len(smoothings))
-            run = self._compiled(blocks, terms, {"vertices": problem.fixed}).solve(
+            terms = problem.terms(vertices, problem.smoothing(vertices, fraction))
+            run = self._compiled(blocks, terms, {"vertices": problem.fixed_in_space}).solve(
                 blocks,
                 settings=problem.settings.projection,
                 callback=self.callback,
                 observe=lambda state: self.observe(state["vertices"]),
-                guard=FaceGuard(problem.topology, lambda state: state["vertices"]),
+                guard=FaceGuard(problem.topology, lambda state: state["vertices"], problem.least_angle(vertices)),
             )
             vertices = run.blocks["vertices"]
             yield vertices, run
             if stopped(run):
                 return
+        if problem.has_tangent_planes:
+            # Patches at the boundary are frozen in the plane, so they are made anew.
+            last = [problem.settings.smoothing] * _TANGENT_ROUNDS
+            yield from self._along_normals(vertices, last, problem.settings.fairness_weight, correct=True)
 
-    def _along_normals(self, vertices: Tensor, smoothings: Sequence[float], fairness: float) -> Iterator[Stage]:
+    def _along_normals(
+        self, vertices: Tensor, smoothings: Sequence[float], fairness: float, *, correct: bool = False
+    ) -> Iterator[Stage]:
         for fraction in smoothings:
-            vertices, run = self._one_along_normals(vertices, fraction, fairness)
+            if correct:
+                self._known.clear()  # patches may fit at other vertices than before
+            vertices, run = self._one_along_normals(vertices, fraction, fairness, correct)
             yield vertices, run
             if stopped(run):
                 return
@@ -127,7 +134,7 @@ class FormStages:
             return replace(own, merit_tolerance=_ROUGHLY * own.merit_tolerance, patience=1)
         return replace(own, merit_tolerance=_THOROUGHLY * own.merit_tolerance)
 
-    def _one_along_normals(self, base: Tensor, fraction: float, fairness: float) -> Stage:
+    def _one_along_normals(self, base: Tensor, fraction: float, fairness: float, correct: bool) -> Stage:
         problem = self.problem
         directions = problem.directions(base)
 
@@ -135,7 +142,7 @@ class FormStages:
             return base + state["heights"] * directions
 
         blocks = {"heights": torch.zeros(base.shape[0], 1, dtype=base.dtype)}
-        terms = problem.height_terms(base, directions, problem.smoothing(base, fraction), fairness)
+        terms = problem.height_terms(base, directions, problem.smoothing(base, fraction), fairness, correct=correct)
         run = self._compiled(blocks, terms, {"heights": problem.topology.is_boundary_vertex | problem.fixed}).solve(
             blocks,
             settings=self._along_normals_settings(fraction),
