@@ -9,6 +9,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.formfinding.face_guard import FaceGuard
+from torchfair.geometry import corner_angles
 from torchfair.projection.layout import State
 
 TOPOLOGY = Topology.from_faces([[0, 1, 2], [0, 2, 3]])
@@ -43,3 +44,12 @@ def test_normals_of_a_trial_are_not_computed_again_when_it_becomes_the_state() -
     for state, trial in itertools.pairwise(states):
         assert guard(state, trial)
     assert len(asked) == 4
+
+
+def test_steps_that_collapse_an_angle_are_refused_on_request() -> None:
+    flat = {"x": moved(1, [1.0, 0.95, 0.0])["x"]}
+    start = {"x": SQUARE}
+    smallest = float(corner_angles(flat["x"], TOPOLOGY).min())
+    assert FaceGuard(TOPOLOGY, lambda state: state["x"])(start, flat)
+    assert FaceGuard(TOPOLOGY, lambda state: state["x"], 0.99 * smallest)(start, flat)
+    assert not FaceGuard(TOPOLOGY, lambda state: state["x"], 1.01 * smallest)(start, flat)
