@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -18,27 +16,8 @@ from torchfair.geometry import planarity
 from torchfair.io import load_mesh
 from torchfair.principal import principal_edges_of_lattice
 
-FOLDER = Path(__file__).parents[2] / "experiments"
 Run = Callable[..., dict[str, Any]]
-TINY = ("--width", "500", "--around", "16")
-
-
-@pytest.fixture
-def script(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
-    """Imports a script as the command line would find it."""
-    monkeypatch.syspath_prepend(str(FOLDER))
-    return importlib.import_module
-
-
-@pytest.fixture
-def run(script: Callable[[str], ModuleType], tmp_path: Path) -> Run:
-    """Runs a script in a folder and returns its JSON."""
-
-    def call(name: str, *options: str, folder: str = "out") -> dict[str, Any]:
-        assert script(name).main(["--output", str(tmp_path / folder), *TINY, *options]) == 0
-        return json.loads((tmp_path / folder / "result.json").read_text())
-
-    return call
+AROUND = ("--around", "16")
 
 
 def assert_principal_symmetric(level: dict[str, Any]) -> None:
@@ -50,7 +29,7 @@ def assert_principal_symmetric(level: dict[str, Any]) -> None:
 
 
 def test_annulus_stays_principal_symmetric_and_carries_developable_strips(run: Run, tmp_path: Path) -> None:
-    report = run("fig05_annulus", "--rings", "6", "--outwards", "0.1", "--inwards", "0.06", "--held", "4")
+    report = run("fig05_annulus", *AROUND, "--rings", "6", "--outwards", "0.1", "--inwards", "0.06", "--held", "4")
     assert_principal_symmetric(report["design"])
     assert report["largest_pull"] == pytest.approx(math.hypot(0.1, 0.05))
     assert report["gauss_image"]["crossing"] == 0
@@ -79,7 +58,7 @@ def test_designs_from_a_torus_stay_principal_symmetric_when_refined(run: Run, tm
         "--inwards",
         "0.05",
     )
-    report = run("fig14_design", *options)
+    report = run("fig14_design", *AROUND, *options)
     assert [level["vertices"] for level in report["levels"]] == [192, 768]
     for level in report["levels"]:
         assert_principal_symmetric(level)
@@ -111,7 +90,7 @@ def test_principal_quads_lie_on_the_lines_of_a_lattice(script: Callable[[str], M
 def test_conditions_on_chosen_polylines_leave_the_rest_to_the_energy(run: Run) -> None:
     options = ("--rows", "8", "--smooth", "0", "--size", "64", "--spacing", "2")
     plain, report = (
-        run("fig14h_polylines", *options, "--energy-weight", weight, folder=weight) for weight in ("0", "0.03")
+        run("fig14h_polylines", *AROUND, *options, "--energy-weight", weight, folder=weight) for weight in ("0", "0.03")
     )
     assert report["conditions_at"] == 4 * 16
     for level in report["levels"]:
