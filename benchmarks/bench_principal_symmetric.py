@@ -1,7 +1,7 @@
 """An edit of a principal-symmetric mesh, one handle moved, in three formulations; and table 20 of the paper.
 
 Run ``python benchmarks/bench_principal_symmetric.py [--cases 480 714 1920] [--formulations spheres eliminated lifted]
-[--threads 1 2] [--repeats 3] [--table 480 714 1920 7680] [--lifted-most 714] [--json FILE]``.
+[--threads 1 2] [--repeats 3] [--table 5ac 14bc ...] [--lifted-most 714] [--json FILE]``.
 
 The mesh has been designed by handles before, so everything is compiled and the conditions are met. Then one handle
 moves on by the length of a mean edge (or ``--move``), and the design answers, several times from the same state, all
@@ -31,86 +31,22 @@ import math
 import os
 import platform
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from symmetric_problems import CASES, SHAPES, Handles, prepared
 from torch import Tensor
 
 import torchfair
-from torchfair.formfinding import SymmetricSettings
 from torchfair.formfinding.symmetric_design import SymmetricDesign
 from torchfair.formfinding.symmetric_report import condition_residuals
 from torchfair.geometry import edge_lengths
-from torchfair.principal import principal_edges_of_lattice
 from torchfair.projection.layout import State
-from torchfair.shapes import Catenoid, Surface, Torus, principal_triangles
 
 FORMULATIONS = ("spheres", "eliminated", "lifted")
 WANTED = 1e-6
 MOST_STEPS = 25
-LIFTED_MOST = 1920  # largest size in table 20; beyond, a step takes minutes
-Handles = dict[int, list[float]]
-
-
-@dataclass(frozen=True)
-class Case:
-    """A mesh, how its handles are pulled first, and what the paper prints for its size.
-
-    Attributes:
-        rows, columns: of the lattice.
-        pulls: away from the axis and along it, in sizes of the mesh, for handles in turn around the axis.
-        at: parameter v of the handles; ``held`` that of vertices that stay, six of them.
-        target: steps per second.
-        figure, variables, seconds: of table 20; thousands of variables, seconds for one iteration.
-    """
-
-    surface: Surface
-    rows: int
-    columns: int
-    pulls: tuple[tuple[float, float], tuple[float, float]]
-    at: float
-    held: float | None
-    target: float | None
-    figure: str
-    variables: int
-    seconds: float
-
-
-RING = Torus(2.0, 0.8)
-OVAL = ((0.15, 0.0), (-0.10, 0.0))
-CASES = {
-    480: Case(RING, 16, 30, OVAL, 0.0, None, 20.0, "14bc", 17, 0.49),
-    714: Case(Catenoid(1.0, (-1.2, 1.2)), 16, 42, ((0.15, 0.05), (-0.10, -0.05)), 1.2, -1.2, 20.0, "5ac", 25, 0.53),
-    1920: Case(RING, 32, 60, OVAL, 0.0, None, 4.0, "14d", 69, 7.07),
-    7680: Case(RING, 64, 120, OVAL, 0.0, None, None, "14e", 23, 6.65),
-}
-
-
-def prepared(case: Case, formulation: str, most_steps: int = 150) -> tuple[SymmetricDesign, Handles]:
-    """The design before its handles are pulled, and where they go first."""
-    mesh = principal_triangles(case.surface, case.rows, case.columns, along="u")
-    vertices = mesh.vertices
-    size = float(torch.linalg.vector_norm(vertices.amax(0) - vertices.amin(0)))
-
-    def vertex(turn: float, v: float) -> int:
-        place = case.surface.position(*torch.tensor([[turn], [v]], dtype=torch.float64))
-        return int(torch.linalg.vector_norm(vertices - place, dim=1).argmin())
-
-    handles = {}
-    for number in range(4):
-        chosen = vertex(number * math.pi / 2, case.at)
-        x, y, z = vertices[chosen].tolist()
-        outwards, upwards = (size * pull for pull in case.pulls[number % 2])
-        stretch = 1.0 + outwards / math.hypot(x, y)
-        handles[chosen] = [stretch * x, stretch * y, z + upwards]
-    if case.held is not None:
-        for number in range(6):
-            chosen = vertex(number * math.pi / 3, case.held)
-            handles[chosen] = vertices[chosen].tolist()
-    settings = SymmetricSettings(formulation=formulation, most_steps=most_steps)
-    principal = principal_edges_of_lattice(mesh, "u")
-    return SymmetricDesign(vertices, principal, handles=list(handles), settings=settings), handles
+LIFTED_MOST = 1920  # vertices in table 20; beyond, a step takes minutes
 
 
 def largest_residual(design: SymmetricDesign, vertices: Tensor) -> float:
@@ -158,8 +94,8 @@ class Edit:
     """One case in one formulation, designed and ready to be edited again and again."""
 
     def __init__(self, size: int, formulation: str, move: float) -> None:
-        self.size, self.case, self.formulation = size, CASES[size], formulation
-        self.design, handles = prepared(self.case, formulation)
+        self.size, self.formulation = size, formulation
+        self.design, handles = prepared(SHAPES[size], formulation)
         self.design.move(handles)
         first = next(iter(handles))
         mean = float(edge_lengths(self.design.vertices, self.design.topology).mean())
@@ -194,8 +130,8 @@ class Edit:
             "largest_residual": largest_residual(self.answer, self.answer.vertices),
             "saddle_side_share": measures["saddle_side_share"],
             "largest_handle_distance": measures["largest_handle_distance"],
-            "paper_step_s": self.case.seconds,
-            "target_steps_per_s": self.case.target,
+            "paper_step_s": next(case.seconds for case in CASES.values() if case.size == self.size),
+            "target_steps_per_s": SHAPES[self.size].target,
         }
 
 
@@ -243,29 +179,30 @@ def edits(
     return rows
 
 
-def table_20(sizes: list[int], formulations: list[str], steps: int) -> list[dict[str, object]]:
+def table_20(figures: list[str], formulations: list[str], steps: int) -> list[dict[str, object]]:
     """Variables and seconds of a damped step from the first pull of the handles, beside the paper's."""
-    print(f"\n{'ours':>39}{'paper':>30}\n{'fig.':>5}{'V':>6}{'E':>7}{'F':>7}  {'formulation':12}", end="")
+    print(f"\n{'ours':>44}{'paper':>30}\n{'fig.':>5}{'V':>6}{'E':>7}{'F':>7}{'stars':>7}  {'formulation':12}", end="")
     print(f"{'variables':>10}{'s/step':>8}{'variables':>11}{'s/step':>8}{'over ours':>11}")
     rows = []
-    for size in sizes:
-        case = CASES[size]
+    for figure in figures:
+        case = CASES[figure]
         for formulation in formulations:
-            if formulation == "lifted" and size > LIFTED_MOST:
+            if formulation == "lifted" and case.size > LIFTED_MOST:
                 continue
-            design, handles = prepared(case, formulation, steps)
+            shape = SHAPES[case.size]
+            design, handles = prepared(shape, formulation, most_steps=steps, on_polylines=case.on_polylines)
             design.move(handles)
             taken = sum(run.iterations for run in design.runs)
             seconds = sum(run.timings["total"] for run in design.runs) / taken
             variables = sum(block.numel() for block in design.problem.blocks(design.problem.base).values())
-            topology = design.topology
+            mesh, stars = design.topology, design.stars.vertices.shape[0]
             rows.append({
-                "figure": case.figure, "vertices": topology.num_vertices, "edges": topology.num_edges,
-                "faces": topology.num_faces, "formulation": formulation, "variables": variables, "step_s": seconds,
+                "figure": figure, "vertices": mesh.num_vertices, "edges": mesh.num_edges, "faces": mesh.num_faces,
+                "stars": stars, "formulation": formulation, "variables": variables, "step_s": seconds,
                 "paper_variables": 1000 * case.variables, "paper_step_s": case.seconds,
             })  # fmt: skip
             print(
-                f"{case.figure:>5}{topology.num_vertices:>6}{topology.num_edges:>7}{topology.num_faces:>7}  "
+                f"{figure:>5}{mesh.num_vertices:>6}{mesh.num_edges:>7}{mesh.num_faces:>7}{stars:>7}  "
                 f"{formulation:12}{variables:>10}{seconds:8.3f}{case.variables:>10}k{case.seconds:8.2f}"
                 f"{case.seconds / seconds:11.1f}",
                 flush=True,
@@ -275,12 +212,12 @@ def table_20(sizes: list[int], formulations: list[str], steps: int) -> list[dict
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, nargs="*", default=[480, 714, 1920], choices=list(CASES))
+    parser.add_argument("--cases", type=int, nargs="*", default=[480, 714, 1920], choices=list(SHAPES))
     parser.add_argument("--formulations", nargs="+", default=list(FORMULATIONS), choices=FORMULATIONS)
     parser.add_argument("--threads", type=int, nargs="+", default=sorted({1, torch.get_num_threads()}))
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--move", type=float, default=1.0, help="of the handle, in mean edges (default: %(default)s)")
-    parser.add_argument("--table", type=int, nargs="*", default=[480, 714, 1920, 7680], help="sizes; none: left out")
+    parser.add_argument("--table", nargs="*", default=list(CASES), choices=list(CASES), help="figures; none: left out")
     parser.add_argument("--table-steps", type=int, default=6, help="damped steps in each row (default: %(default)s)")
     parser.add_argument("--lifted-most", type=int, default=714, help="largest edit in the paper's variables")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
