@@ -4,6 +4,7 @@ from .absolute_curvature import absolute_curvature_terms as absolute_curvature_t
 from .along_directions import along_directions as along_directions
 from .barrier import barrier as barrier
 from .boundary_bending import boundary_bending_terms as boundary_bending_terms
+from .boundary_jets import BoundaryJets as BoundaryJets
 from .closeness import closeness_terms as closeness_terms
 from .closeness import distance_limit_terms as distance_limit_terms
 from .element_quality import corner_angle_terms as corner_angle_terms

@@ -35,13 +35,14 @@ class FormSettings:
             kept.
         boundary_weight: Weight of the squared distance of gliding vertices from their curve.
         corner_angle: The boundary has a corner where it turns by more than this, radians.
-        tangent_weight: Weight of the squared angle between prescribed and actual normals, radians.
+        tangent_weight: Weight of the squared angle between prescribed and actual normals, radians; ten times it in
+            the end.
         handle_weight: Weight of the squared distance of handles from their targets.
         coarse_smoothing, smoothing: Stars with less curvature than this fraction of the mean over all stars
             are treated as flat, at first and in the end; in between, by steps of about five.
         least_angle: A surface found with the coarse smoothing that has a smaller corner angle than this, radians
             (or half the smallest of the start), is suspected to have collapsed and sought once more with the
-            last smoothing alone; likewise one that has not converged.
+            last smoothing alone; likewise one that has not converged. In space no step leads to a smaller one.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables
             too (for comparison: slower).
         constraint_weight: Weight of the constraints that define auxiliary variables.
