@@ -100,5 +100,5 @@ def test_a_star_of_small_excess_is_to_lose_it_and_one_of_large_excess_is_to_be_a
     assert not bool(sides.is_saddle[excess <= 0.0].any())
     (term,) = sides.terms(weight=1.0)
     values = term.values(term.arguments({"vertices": mesh.vertices}))
-    assert bool((values[~sides.is_saddle][:, :4] == 0.0).all())
-    assert bool((values[sides.is_saddle][:, 4] == 0.0).all())
+    assert bool((values[~sides.is_saddle][:, :5] == 0.0).all())
+    assert bool((values[sides.is_saddle][:, 5] == 0.0).all())

@@ -25,11 +25,12 @@ from torch import Tensor
 
 from ..geometry._ops import cross, dot, norm
 from ..principal.principal_edges import PrincipalStars
-from ..principal.spheres import star_spheres
+from ..principal.spheres import spheres_through, star_spheres
 from ..projection import ElementTerm
 from ..projection.layout import State
 
 NEGATIVE = 1e-9  # radians by which the angle sum is above 2 pi where curvature counts as negative
+_RECONSIDERED = 8.0  # factor of a changed preference
 _FLATTEST = 1e-2  # curvature times edge length below which a sphere counts as this
 
 
@@ -75,39 +76,58 @@ class SaddleSides:
         self.stencil = star_stencil(stars)
         count = stars.vertices.shape[0]
         self.is_saddle = torch.zeros(count, dtype=torch.bool)
+        self._preference = torch.ones(count, dtype=torch.float64)
         self._data: tuple[Tensor, ...] = ()
 
     def decide(self, vertices: Tensor) -> int:
         """Decides at ``vertices`` (V, 3), for the terms from now on.
 
-        Stars whose angle sum is at most 2 pi are to stay so; those above 2 pi are to be saddle-shaped, unless it
-        takes a smaller change of the curvature along the principal edges to bring the angle sum below 2 pi.
+        Stars whose angle sum is at most 2 pi are to stay so; those above 2 pi are to be saddle-shaped, with the sign
+        of the curvature of the sphere that takes the smaller change of curvatures; unless it takes a smaller one to
+        bring the angle sum below 2 pi.
 
         Returns:
             How many stars with an angle sum above 2 pi are not saddle-shaped.
         """
         x = vertices[self.stencil]
-        curvatures = star_spheres(vertices, self.stars).curvatures
-        scale = curvatures.abs().clamp_min(_FLATTEST)
-        sign = torch.where(curvatures < 0, -1.0, 1.0).to(x.dtype)
+        spheres, faces = star_spheres(vertices, self.stars).curvatures, face_side_curvatures(x)
+        scale = torch.maximum(spheres.abs(), faces.abs().mean(1)).clamp_min(_FLATTEST)
+        as_it_is, as_faces_ask = _sign(spheres), -_sign(faces.mean(1))
+        keep, turn = (
+            (sign[:, None] * faces).amax(1).clamp_min(0.0) + (-sign * spheres).clamp_min(0.0)
+            for sign in (as_it_is, as_faces_ask)
+        )
+        sign = torch.where(turn < keep, as_faces_ask, as_it_is)
         spokes = x[:, 1:] - x[:, :1]
         area = norm(cross(spokes, spokes.roll(-1, 1))).sum(1) / 6.0
         excess = angle_excess(x)
-        short = (sign[:, None] * face_side_curvatures(x)).amax(1).clamp_min(0.0)
-        self.is_saddle = (excess > 0.0) & (short <= excess / (area * scale))
+        self.is_saddle = (excess > 0.0) & (torch.minimum(keep, turn) <= self._preference * excess / (area * scale))
         self._data = (self.is_saddle.to(x.dtype), sign / scale, 1.0 / (scale * scale * area))
         return self.count_wrong(vertices)
+
+    def forget(self) -> None:
+        """Back to decisions by the smaller change alone."""
+        self._preference.fill_(1.0)
+
+    def reconsider(self, vertices: Tensor) -> None:
+        """Makes the other decision likelier at stars that are wrong at ``vertices`` (V, 3)."""
+        wrong = self.are_wrong(vertices)
+        factor = torch.where(self.is_saddle, 1.0 / _RECONSIDERED, _RECONSIDERED).to(self._preference)
+        self._preference = torch.where(wrong, factor * self._preference, self._preference)
 
     def are_negative(self, vertices: Tensor) -> Tensor:
         """(R,) bool: stars with an angle sum above 2 pi at ``vertices`` (V, 3)."""
         return angle_excess(vertices[self.stencil]) > NEGATIVE
 
-    def count_wrong(self, vertices: Tensor) -> int:
-        """How many stars with an angle sum above 2 pi are not saddle-shaped at ``vertices`` (V, 3)."""
-        x = vertices[self.stencil]
+    def are_wrong(self, vertices: Tensor) -> Tensor:
+        """(R,) bool: stars with an angle sum above 2 pi that are not saddle-shaped at ``vertices`` (V, 3)."""
         curvatures = star_spheres(vertices, self.stars).curvatures
-        beyond = (torch.sign(curvatures)[:, None] * face_side_curvatures(x) < 0.0).all(1)
-        return int((self.are_negative(vertices) & ~beyond).sum())
+        beyond = (torch.sign(curvatures)[:, None] * face_side_curvatures(vertices[self.stencil]) < 0.0).all(1)
+        return self.are_negative(vertices) & ~beyond
+
+    def count_wrong(self, vertices: Tensor) -> int:
+        """How many stars are wrong at ``vertices`` (V, 3), see :meth:`are_wrong`."""
+        return int(self.are_wrong(vertices).sum())
 
     def __call__(self, state: State) -> tuple[Tensor, ...]:
         """Data of the terms."""
@@ -116,12 +136,20 @@ class SaddleSides:
         return self._data
 
     def lacking(self, x: Tensor, is_saddle: Tensor, per_curvature: Tensor, per_excess: Tensor) -> Tensor:
-        """By how much stars ``x`` (n, 7, 3) miss what they are to be, (n, 5), in curvatures of their spheres."""
+        """By how much stars ``x`` (n, 7, 3) miss what they are to be, (n, 6), in curvatures of the star."""
         sides = torch.relu(self.margin + per_curvature[:, None] * face_side_curvatures(x))
+        curvature = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]]).curvatures
+        bent = torch.relu(0.4 * self.margin - per_curvature * curvature)
         excess = torch.relu(0.4 * self.margin + per_excess * angle_excess(x))
-        return torch.cat([is_saddle[:, None] * sides, ((1.0 - is_saddle) * excess)[:, None]], dim=1)
+        saddle = torch.cat([sides, bent[:, None]], dim=1)
+        return torch.cat([is_saddle[:, None] * saddle, ((1.0 - is_saddle) * excess)[:, None]], dim=1)
 
     def terms(self, *, weight: float) -> list[ElementTerm]:
         """One element for each star."""
         stencil = [(self.block, self.stencil)]
         return [ElementTerm("saddle sides", self.lacking, stencil, weight=weight, refresh=self, batched=True)]
+
+
+def _sign(values: Tensor) -> Tensor:
+    """-1 or 1, 1 at zero."""
+    return torch.where(values < 0, -1.0, 1.0).to(values.dtype)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from ..boundary import boundary_corners
 from ..errors import MeshError
 from ..geometry.closest_point import ReferenceSurface
 from ..principal import PrincipalEdges
@@ -18,7 +19,8 @@ from ..projection.iteration import Callback
 from ..projection.layout import State
 from ..projection.normalisation import Normalisation
 from ..stars import pyramid_self_intersections
-from ..subdivision import loop
+from ..subdivision import interpolate_vertices, loop
+from ..subdivision.interpolation import BOUNDARY_CORNER
 from ..topology import Topology
 from .checks import one_start, refuse_degenerate_faces
 from .strip_normals import strip_normals
@@ -38,7 +40,9 @@ _TIGHT_STEPS = 5
 _PORTION_STEPS = 6
 _LONGEST_PULL = 3.0  # mean edge lengths that handles are pulled at once
 _MOST_PORTIONS = 12
+_PULLED = 0.1  # mean edge lengths from which on handles may be to blame where conditions cannot be met
 _MORE_MARGIN = 1.6  # from round to round
+_PATIENT_ROUNDS = 2  # before stars that stay wrong are to be something else
 _LESS_PULL = 0.1
 _FEW = 0.01  # share of stars with wrong sides that a wider margin may mend
 
@@ -118,8 +122,10 @@ class SymmetricDesign:
             stopped = self._run(Aim.EXACT, _EXACT, begin, callback)
             self._take(self._state)
             return stopped
+        pulled = self._farthest(start["vertices"]) > _PULLED
         best: tuple[tuple[float, float], State] | None = None
         self.problem.sides.margin, self.problem.pull = self.settings.saddle_margin, 1.0
+        self.problem.sides.forget()
         for attempt in range(self.settings.rounds):
             stopped = self._round(callback, begin, first=attempt == 0)
             score = self._score()
@@ -127,11 +133,14 @@ class SymmetricDesign:
                 best = (score, self._state)
             if stopped or score == (self.settings.tolerance, 0.0) or not self._steps_left(begin):
                 break
-            if score[0] > self.settings.tolerance or score[1] > _FEW * self.stars.vertices.shape[0]:
+            many = attempt > 0 and score[1] > _FEW * self.stars.vertices.shape[0]
+            if pulled and (many or score[0] > self.settings.tolerance):
                 self._state = start
                 self.problem.pull *= _LESS_PULL
             else:
                 self.problem.sides.margin *= _MORE_MARGIN
+                if attempt >= _PATIENT_ROUNDS:
+                    self.problem.sides.reconsider(self._state["vertices"])
         assert best is not None
         self._take(best[1])
         return stopped
@@ -154,10 +163,11 @@ class SymmetricDesign:
     def refined(self) -> SymmetricDesign:
         """The design on the mesh refined by Loop subdivision, labels, handles and fixed vertices carried along.
 
-        Boundary vertices keep their places, handles and fixed vertices are put back to theirs.
+        Vertices keep their places; see :func:`~torchfair.subdivision.interpolate_vertices`.
         """
-        step = loop(self.topology, boundary="interpolate")
-        finer = step.apply(self.vertices)
+        corners = boundary_corners(self.vertices, self.topology, BOUNDARY_CORNER)
+        step = loop(self.topology, boundary="interpolate", corners=corners)
+        finer = interpolate_vertices(step, self.vertices, self.normals())
         kept = self.handles
         fixed = step.carry_vertex_labels(self.fixed, along=self._fixed_edges())
         boundary_only = step.topology.is_boundary_vertex
@@ -215,8 +225,7 @@ class SymmetricDesign:
     def _approach(self, begin: int, callback: Callback | None) -> bool:
         """Pulls handles most of the way in portions, where they are far from their targets."""
         start, end = self._state["vertices"][self.handles], self.problem.targets
-        farthest = float(torch.linalg.vector_norm(end - start, dim=1).max()) if self.handles.numel() else 0.0
-        portions = math.ceil(farthest / _LONGEST_PULL)
+        portions = math.ceil(self._farthest(self._state["vertices"]) / _LONGEST_PULL)
         for portion in range(1, min(portions, _MOST_PORTIONS)):
             self.problem.targets = start.lerp(end, portion / portions)
             self.problem.sides.decide(self._state["vertices"])
@@ -248,9 +257,13 @@ class SymmetricDesign:
         """Whether the state is all that is asked for already."""
         if self._reference is not None or self.settings.energy_weight:
             return False
-        away = self._state["vertices"][self.handles] - self.problem.targets
-        at_targets = not away.numel() or float(away.abs().max()) <= self.settings.tolerance
+        at_targets = self._farthest(self._state["vertices"]) <= self.settings.tolerance
         return at_targets and self._score() == (self.settings.tolerance, 0.0)
+
+    def _farthest(self, vertices: Tensor) -> float:
+        """Largest distance of a handle from its target."""
+        away = torch.linalg.vector_norm(vertices[self.handles] - self.problem.targets, dim=1)
+        return float(away.max()) if away.numel() else 0.0
 
     def _score(self) -> tuple[float, float]:
         """Largest relative residual, and how many saddle sides are wrong: what a round is judged by."""

@@ -2,6 +2,7 @@
 
 from .catmull_clark import catmull_clark as catmull_clark
 from .hybrid import hybrid as hybrid
+from .interpolation import interpolate_vertices as interpolate_vertices
 from .loop import loop as loop
 from .midpoint import midpoint as midpoint
 from .refine import refine as refine
