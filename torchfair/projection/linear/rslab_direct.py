@@ -13,7 +13,7 @@ from ...errors import SingularSystemError
 from ..system import Structure
 from .direct import SparseDirect, Substitution
 
-_ROUGHEST = 1e-9  # relative remainder of every step, so that results do not depend on how sums are rounded
+_ROUGHEST = 1e-12  # relative remainder of every step, so that results do not depend on how sums are rounded
 _REFINEMENTS = 8
 _SMALLEST_RACE = 20_000  # unknowns
 _LEAST_PROGRESS = 0.1  # of a refinement that is worth another one
@@ -23,7 +23,7 @@ class RslabDirect(SparseDirect):
     """Supernodal ``L D L^T`` (``pip install torchfair[direct]``); several times faster than SuperLU.
 
     The factor is computed in single precision, in half the time, and its solution refined with the matrix in
-    double precision until the remainder is below 1e-9 of the right-hand side, or the accuracy asked for. Where
+    double precision until the remainder is below 1e-12 of the right-hand side, or the accuracy asked for. Where
     that fails, the factor is computed again in double precision, and so it stays until the next :meth:`prepare`.
 
     Factors whose inertia is not positive are refused, so that an indefinite matrix raises the damping.
