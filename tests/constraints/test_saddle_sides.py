@@ -8,9 +8,10 @@ import pytest
 import torch
 from helpers import DOUBLE, random_rotation
 
-from torchfair.constraints.saddle_sides import SaddleSides, angle_excess, face_side_curvatures, star_stencil
+from torchfair.constraints.saddle_sides import SaddleSides, angle_excess, side_curvatures, star_stencil
 from torchfair.geometry import corner_angles
 from torchfair.principal import principal_edges_of_lattice
+from torchfair.principal.spheres import spheres_through
 from torchfair.shapes import Catenoid, Torus, principal_triangles
 from torchfair.stars import pyramid_self_intersections
 
@@ -48,7 +49,12 @@ def test_face_sides_follow_their_definition(sideways: float) -> None:
         normal = torch.linalg.cross(a - v, b - v)
         normal = normal / normal.norm()
         values += [2.0 * normal @ (w - v) / (w - v).square().sum() for w in (w1, w4)]
-    torch.testing.assert_close(face_side_curvatures(star)[0], torch.stack(values))
+    sides, spheres = side_curvatures(star)
+    torch.testing.assert_close(sides[0, 2:], torch.stack(values))
+    fitted = spheres_through(star[:, 0], star[:, [2, 3, 5, 6]])
+    tangent = [2.0 * fitted.normals[0] @ (w - v) / (w - v).square().sum() for w in (w1, w4)]
+    torch.testing.assert_close(sides[0, :2], torch.stack(tangent))
+    torch.testing.assert_close(spheres, fitted.curvatures)
 
 
 def test_stars_on_the_right_side_of_both_faces_have_simple_pyramids_and_others_cross() -> None:
@@ -61,11 +67,12 @@ def test_stars_on_the_right_side_of_both_faces_have_simple_pyramids_and_others_c
             star = symmetric_star(principal, -0.5, sideways=sideways)
             if float(angle_excess(star)) < 1e-3:
                 continue
-            beyond = bool((face_side_curvatures(star) > 0.0).all())
+            sides = side_curvatures(star)[0]
+            beyond = bool((sides > 0.0).all())
             crossings = int(pyramid_self_intersections(star[0], fan)[0])
             if beyond:
                 assert crossings == 0
-            elif float(face_side_curvatures(star).min()) < -1e-3:
+            elif float(sides[0, 2:].min()) < -1e-3:
                 assert crossings > 0
 
 
@@ -100,5 +107,5 @@ def test_a_star_of_small_excess_is_to_lose_it_and_one_of_large_excess_is_to_be_a
     assert not bool(sides.is_saddle[excess <= 0.0].any())
     (term,) = sides.terms(weight=1.0)
     values = term.values(term.arguments({"vertices": mesh.vertices}))
-    assert bool((values[~sides.is_saddle][:, :5] == 0.0).all())
-    assert bool((values[sides.is_saddle][:, 5] == 0.0).all())
+    assert bool((values[~sides.is_saddle][:, :7] == 0.0).all())
+    assert bool((values[sides.is_saddle][:, 7] == 0.0).all())

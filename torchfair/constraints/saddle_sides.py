@@ -3,8 +3,8 @@ r"""Saddle sides of principal-symmetric stars (paper section 5.2): principal nei
 The paper asks that, where the angle sum is above 2 pi, principal neighbours lie on one side of the tangent plane of
 the sphere and cospherical ones on the other. That leaves stars near parabolic curves of the surface, where principal
 polylines are curved sideways, in one half-plane: not saddle-shaped, with a self-intersecting pyramid. Saddle-shaped
-they are if the principal neighbours lie beyond the planes of both faces without a principal edge, v w2 w3 and
-v w5 w6, and then they lie beyond the tangent plane too::
+they are if the principal neighbours lie beyond the planes of both faces without a principal edge too, v w2 w3 and
+v w5 w6::
 
         w3    w2
           \  /
@@ -25,7 +25,7 @@ from torch import Tensor
 
 from ..geometry._ops import cross, dot, norm
 from ..principal.principal_edges import PrincipalStars
-from ..principal.spheres import spheres_through, star_spheres
+from ..principal.spheres import spheres_through
 from ..projection import ElementTerm
 from ..projection.layout import State
 
@@ -49,17 +49,20 @@ def angle_excess(x: Tensor) -> Tensor:
     return angles.sum(1) - 2.0 * math.pi
 
 
-def face_side_curvatures(x: Tensor) -> Tensor:
-    """``2 n.d / |d|^2`` for the spokes d to w1 and w4 and the unit normals n of the faces v w2 w3 and v w5 w6, (n, 4).
+def side_curvatures(x: Tensor) -> tuple[Tensor, Tensor]:
+    """``2 n.d / |d|^2`` for the spokes d to w1 and w4 and three unit normals n, (n, 6), and curvatures of spheres (n,).
 
-    That is the curvature of a circle that touches the plane of the face in v and passes through the neighbour.
+    The normals are those of the sphere of the star, and of the faces v w2 w3 and v w5 w6. The quotient is the curvature
+    of a circle that touches the plane orthogonal to n in v and passes through the neighbour.
     """
     spokes = x[:, 1:] - x[:, :1]
     principal = spokes[:, [0, 3]]
-    normals = cross(spokes[:, [1, 4]], spokes[:, [2, 5]])
-    normals = normals / norm(normals).clamp_min(1e-12)[..., None]
+    sphere = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]])
+    faces = cross(spokes[:, [1, 4]], spokes[:, [2, 5]])
+    faces = faces / norm(faces).clamp_min(1e-12)[..., None]
+    normals = torch.cat([sphere.normals[:, None], faces], dim=1)
     heights = dot(normals[:, :, None], principal[:, None])
-    return (2.0 * heights / dot(principal, principal).clamp_min(1e-24)[:, None]).flatten(1)
+    return (2.0 * heights / dot(principal, principal).clamp_min(1e-24)[:, None]).flatten(1), sphere.curvatures
 
 
 class SaddleSides:
@@ -90,11 +93,11 @@ class SaddleSides:
             How many stars with an angle sum above 2 pi are not saddle-shaped.
         """
         x = vertices[self.stencil]
-        spheres, faces = star_spheres(vertices, self.stars).curvatures, face_side_curvatures(x)
-        scale = torch.maximum(spheres.abs(), faces.abs().mean(1)).clamp_min(_FLATTEST)
-        as_it_is, as_faces_ask = _sign(spheres), -_sign(faces.mean(1))
+        sides, spheres = side_curvatures(x)
+        scale = torch.maximum(spheres.abs(), sides.abs().mean(1)).clamp_min(_FLATTEST)
+        as_it_is, as_faces_ask = _sign(spheres), -_sign(sides.mean(1))
         keep, turn = (
-            (sign[:, None] * faces).amax(1).clamp_min(0.0) + (-sign * spheres).clamp_min(0.0)
+            (sign[:, None] * sides).amax(1).clamp_min(0.0) + (-sign * spheres).clamp_min(0.0)
             for sign in (as_it_is, as_faces_ask)
         )
         sign = torch.where(turn < keep, as_faces_ask, as_it_is)
@@ -121,8 +124,8 @@ class SaddleSides:
 
     def are_wrong(self, vertices: Tensor) -> Tensor:
         """(R,) bool: stars with an angle sum above 2 pi that are not saddle-shaped at ``vertices`` (V, 3)."""
-        curvatures = star_spheres(vertices, self.stars).curvatures
-        beyond = (torch.sign(curvatures)[:, None] * face_side_curvatures(vertices[self.stencil]) < 0.0).all(1)
+        sides, spheres = side_curvatures(vertices[self.stencil])
+        beyond = (torch.sign(spheres)[:, None] * sides < 0.0).all(1)
         return self.are_negative(vertices) & ~beyond
 
     def count_wrong(self, vertices: Tensor) -> int:
@@ -136,10 +139,10 @@ class SaddleSides:
         return self._data
 
     def lacking(self, x: Tensor, is_saddle: Tensor, per_curvature: Tensor, per_excess: Tensor) -> Tensor:
-        """By how much stars ``x`` (n, 7, 3) miss what they are to be, (n, 6), in curvatures of the star."""
-        sides = torch.relu(self.margin + per_curvature[:, None] * face_side_curvatures(x))
-        curvature = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]]).curvatures
-        bent = torch.relu(0.4 * self.margin - per_curvature * curvature)
+        """By how much stars ``x`` (n, 7, 3) miss what they are to be, (n, 8), in curvatures of the star."""
+        beyond, spheres = side_curvatures(x)
+        sides = torch.relu(self.margin + per_curvature[:, None] * beyond)
+        bent = torch.relu(0.4 * self.margin - per_curvature * spheres)
         excess = torch.relu(0.4 * self.margin + per_excess * angle_excess(x))
         saddle = torch.cat([sides, bent[:, None]], dim=1)
         return torch.cat([is_saddle[:, None] * saddle, ((1.0 - is_saddle) * excess)[:, None]], dim=1)

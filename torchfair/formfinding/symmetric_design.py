@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from ..boundary import boundary_corners
+from ..constraints import BoundaryNormals
 from ..errors import MeshError
 from ..geometry.closest_point import ReferenceSurface
 from ..principal import PrincipalEdges
@@ -167,7 +168,7 @@ class SymmetricDesign:
         """
         corners = boundary_corners(self.vertices, self.topology, BOUNDARY_CORNER)
         step = loop(self.topology, boundary="interpolate", corners=corners)
-        finer = interpolate_vertices(step, self.vertices, self.normals())
+        finer = interpolate_vertices(step, self.vertices, BoundaryNormals.of(self.vertices, self.topology).at_boundary)
         kept = self.handles
         fixed = step.carry_vertex_labels(self.fixed, along=self._fixed_edges())
         boundary_only = step.topology.is_boundary_vertex
