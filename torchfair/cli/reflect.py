@@ -59,16 +59,19 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Checks what can be checked first, then reads, renders, writes and prints."""
+    from ..projection.threads import threads_for
+
     files = _files(arguments)
     if arguments.size < _LEAST_SIZE:
         raise CommandError(f"--size {arguments.size}: pictures need at least {_LEAST_SIZE} pixels to be compared")
     mesh = read_input(arguments.input, arguments.repair)
     reference = read_input(arguments.reference, arguments.repair) if arguments.reference else None
-    score = _score(mesh, reference, arguments)
-    report = numbers(score)
-    report |= {"file": arguments.input, "reference": arguments.reference, "repairs": list(mesh.repairs)}
-    if files:
-        write(files, mesh, score, report, arguments)
+    with threads_for(0, mesh.vertices.device):  # pictures of this size are made of very short operations
+        score = _score(mesh, reference, arguments)
+        report = numbers(score)
+        report |= {"file": arguments.input, "reference": arguments.reference, "repairs": list(mesh.repairs)}
+        if files:
+            write(files, mesh, score, report, arguments)
     if arguments.json:
         sys.stdout.write(to_json(report))
         return 0

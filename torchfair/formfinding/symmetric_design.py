@@ -19,6 +19,7 @@ from ..projection import ProjectionResult, ProjectionSettings, Status
 from ..projection.iteration import Callback
 from ..projection.layout import State
 from ..projection.normalisation import Normalisation
+from ..projection.threads import threads_for
 from ..stars import pyramid_self_intersections
 from ..subdivision import interpolate_vertices, loop
 from ..subdivision.interpolation import BOUNDARY_CORNER
@@ -118,6 +119,10 @@ class SymmetricDesign:
         it is tried again with handles that pull less: they yield to the conditions. A few saddle sides that come out
         wrong are tried again with a wider margin. The best state found is kept.
         """
+        with threads_for(self._state["vertices"].numel(), self._state["vertices"].device):
+            return self._solve(callback)
+
+    def _solve(self, callback: Callback | None) -> bool:
         begin, start = len(self.runs), self._state
         if self._is_done():
             stopped = self._run(Aim.EXACT, _EXACT, begin, callback)
