@@ -205,6 +205,9 @@ def test_an_edit_from_a_warm_state_is_the_same_design() -> None:
     measures = design.measures()
     assert max(measures["largest_cospherical"], measures["largest_coplanar"]) < 1e-9
     assert measures["largest_handle_distance"] < 0.01
+    runs = len(design.runs)
+    design.move({vertex: pulled(vertices, edges, 0.13)[vertex]}, rounds=1)
+    assert len(design.runs) - runs <= 4
     with pytest.raises(MeshError, match="no handle"):
         design.move({far + 1: [0.0, 0.0, 0.0]})
 

@@ -1,0 +1,168 @@
+"""How a principal-symmetric mesh is found: a shape first, then the conditions to rounding; again where that fails."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from ..principal import PrincipalEdges
+from ..projection import ProjectionResult, ProjectionSettings, Status
+from ..projection.iteration import Callback
+from ..projection.layout import State
+from ..stars import pyramid_self_intersections
+from .symmetric_problem import Aim, SymmetricProblem
+from .symmetric_report import condition_residuals, saddle_sides_right
+
+_EXACT = ProjectionSettings(
+    max_iterations=18,
+    initial_damping=1e-4,
+    damping_scale="identity",
+    merit_tolerance=1e-16,
+    step_tolerance=1e-12,
+    least_extrapolation=math.inf,
+)
+_TIGHT_STEPS = 5
+_PORTION_STEPS = 6
+_LONGEST_PULL = 3.0  # mean edge lengths that handles are pulled at once
+_MOST_PORTIONS = 12
+_PULLED = 0.1  # mean edge lengths from which on handles may be to blame where conditions cannot be met
+_MORE_MARGIN = 1.6  # from round to round
+_PATIENT_ROUNDS = 2  # before stars that stay wrong are to be something else
+_LESS_PULL = 0.2
+_FEW = 0.01  # share of stars with wrong sides that a wider margin may mend
+
+
+class SymmetricRounds:
+    """Rounds of one edit; make it, call :meth:`run` once.
+
+    Args:
+        problem: Terms and compiled runs.
+        principal: Which edges are principal.
+        state: Variable blocks to start from.
+        callback: See :func:`~torchfair.projection.guided_projection`.
+
+    Attributes:
+        state: The best state found.
+        runs: Every run of guided projection.
+    """
+
+    def __init__(
+        self, problem: SymmetricProblem, principal: PrincipalEdges, state: State, callback: Callback | None
+    ) -> None:
+        self.problem, self.principal, self.settings = problem, principal, problem.settings
+        self.state, self.callback = state, callback
+        self.runs: list[ProjectionResult] = []
+
+    def run(self, rounds: int, *, settled: bool) -> bool:
+        """Runs round after round until conditions and saddle sides are right; whether it was stopped.
+
+        Args:
+            rounds: At most so many.
+            settled: Whether a state that meets them, with handles at their targets, is all that is asked for.
+        """
+        if settled and self._farthest() <= self.settings.tolerance and self._is_right(self._score()):
+            return self._run(Aim.EXACT, _EXACT)
+        start, pulled = self.state, self._farthest() > _PULLED
+        best: tuple[tuple[float, int], State] | None = None
+        problem = self.problem
+        problem.sides.margin, problem.pull = self.settings.saddle_margin, 1.0
+        problem.sides.forget()
+        stopped = False
+        for attempt in range(rounds):
+            stopped = self._round(first=attempt == 0)
+            score = self._score()
+            if best is None or score < best[0]:
+                best = (score, self.state)
+            if stopped or self._is_right(score) or not self._steps_left():
+                break
+            many = attempt > 0 and score[1] > _FEW * problem.stars.vertices.shape[0]
+            if pulled and (many or score[0] > self.settings.tolerance):
+                self.state = start
+                problem.pull *= _LESS_PULL
+            else:
+                problem.sides.margin *= _MORE_MARGIN
+                if attempt >= _PATIENT_ROUNDS:
+                    problem.sides.reconsider(self.state["vertices"])
+        if best is not None:
+            self.state = best[1]
+        return stopped
+
+    # ---- one round ---------------------------------------------------------------------------------------
+
+    def _round(self, *, first: bool) -> bool:
+        """A shape, the same with tighter conditions, and conditions alone; whether it was stopped."""
+        shape = self.settings.projection
+        if first and self._approach():
+            return True
+        wrong = self._decide()
+        if self._run(Aim.SHAPE, shape):
+            return True
+        if first:
+            wrong = self._decide()
+            if wrong and self._run(Aim.SHAPE, shape):
+                return True
+            self._decide()
+        tight = replace(shape, max_iterations=_TIGHT_STEPS)
+        return self._run(Aim.TIGHT, tight) or self._run(Aim.EXACT, _EXACT)
+
+    def _approach(self) -> bool:
+        """Pulls handles most of the way in portions, where they are far from their targets."""
+        start, end = self.state["vertices"][self.problem.handles], self.problem.targets
+        portions = math.ceil(self._farthest() / _LONGEST_PULL)
+        for portion in range(1, min(portions, _MOST_PORTIONS)):
+            self.problem.targets = start.lerp(end, portion / portions)
+            self._decide()
+            stopped = self._run(Aim.SHAPE, replace(self.settings.projection, max_iterations=_PORTION_STEPS))
+            self.problem.targets = end
+            if stopped:
+                return True
+        return False
+
+    def _decide(self) -> int:
+        return self.problem.sides.decide(self.state["vertices"])
+
+    def _run(self, aim: Aim, settings: ProjectionSettings) -> bool:
+        left = self._steps_left()
+        if not left:
+            return False
+        run = self.problem.compiled(aim).solve(
+            self.state,
+            settings=replace(settings, max_iterations=min(settings.max_iterations, left)),
+            callback=self.callback,
+            guard=self.problem.admits,
+        )
+        self.runs.append(run)
+        self.state = run.blocks
+        return run.status in (Status.INTERRUPTED, Status.CALLBACK)
+
+    def _steps_left(self) -> int:
+        return max(0, self.settings.most_steps - sum(run.iterations for run in self.runs))
+
+    # ---- judgement ---------------------------------------------------------------------------------------
+
+    def _farthest(self) -> float:
+        """Largest distance of a handle from its target."""
+        away = self.state["vertices"][self.problem.handles] - self.problem.targets
+        return float(torch.linalg.vector_norm(away, dim=1).max()) if away.numel() else 0.0
+
+    def _score(self) -> tuple[float, int]:
+        """Largest relative residual, not below the tolerance, and how many saddle sides are wrong."""
+        vertices = self.state["vertices"]
+        residuals = condition_residuals(vertices, self.principal, self.problem.stars)
+        largest = max(float(values.max()) for values in residuals.values() if values.numel())
+        return max(largest, self.settings.tolerance), self._count_wrong(vertices)
+
+    def _is_right(self, score: tuple[float, int]) -> bool:
+        return score == (self.settings.tolerance, 0)
+
+    def _count_wrong(self, vertices: Tensor) -> int:
+        """Stars of negative curvature with principal neighbours on the wrong side, or with a crossing pyramid."""
+        problem = self.problem
+        if not problem.sides.count_wrong(vertices):
+            return 0  # saddle-shaped stars of this kind have simple pyramids
+        negative = problem.sides.are_negative(vertices)
+        crossing = pyramid_self_intersections(vertices, problem.topology)[problem.stars.vertices] > 0
+        return int((negative & (crossing | ~saddle_sides_right(vertices, problem.stars))).sum())
