@@ -17,7 +17,7 @@ from .symmetric_problem import Aim, SymmetricProblem
 from .symmetric_report import condition_residuals, saddle_sides_right
 
 _EXACT = ProjectionSettings(
-    max_iterations=18,
+    max_iterations=25,
     initial_damping=1e-4,
     damping_scale="identity",
     merit_tolerance=1e-16,
