@@ -11,7 +11,7 @@ from torchfair.boundary import boundary_corners
 from torchfair.geometry import vertex_normals
 from torchfair.shapes import Catenoid, Enneper, Paraboloid, ShapeMesh, Torus, principal_triangles
 from torchfair.shapes.principal_triangles import parameter_triangles
-from torchfair.subdivision import Refinement, interpolate_vertices, loop
+from torchfair.subdivision import Refinement, interpolate_vertices, loop, near
 from torchfair.subdivision.interpolation import BOUNDARY_CORNER
 
 
@@ -78,6 +78,24 @@ def test_new_vertices_lie_on_the_surface_up_to_the_boundary(ends: str) -> None:
     assert float(kept[~on_boundary].max()) < 0.35 * float(moved[~on_boundary].max())
     assert float(kept[~on_boundary].mean()) < 0.05 * float(moved[~on_boundary].mean())
     assert float(kept[on_boundary].max()) < 4e-5  # of an arc whose sag is 1e-3
+
+
+def test_what_is_not_kept_is_smoothed_as_loop_does() -> None:
+    mesh = principal_triangles(Torus(2.0, 1.0), 12, 18)
+    step = one_step(mesh)
+    none = torch.zeros(len(mesh.vertices), dtype=torch.bool)
+    torch.testing.assert_close(
+        interpolate_vertices(step, mesh.vertices, keep=near(mesh.topology, none, 3)), step.apply(mesh.vertices)
+    )
+    one = none.clone()
+    one[40] = True
+    weights = near(mesh.topology, one, 4)
+    fine = interpolate_vertices(step, mesh.vertices, keep=weights)
+    assert torch.equal(fine[40], mesh.vertices[40])
+    away = (fine[: len(none)] - mesh.vertices).norm(dim=1)
+    assert float(away[weights == 0.0].min()) > 1e-3
+    assert bool((weights[mesh.topology.edges[(mesh.topology.edges == 40).any(1)]] == 1.0).all())
+    assert sorted(set(weights.tolist())) == pytest.approx([0.0, 0.5 - 0.125**0.5, 0.5, 0.5 + 0.125**0.5, 1.0])
 
 
 def test_motions_and_scale_carry_over() -> None:

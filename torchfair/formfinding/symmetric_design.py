@@ -17,7 +17,7 @@ from ..projection import ProjectionResult
 from ..projection.iteration import Callback
 from ..projection.normalisation import Normalisation
 from ..projection.threads import threads_for
-from ..subdivision import Refinement, interpolate_vertices, loop
+from ..subdivision import Refinement, interpolate_vertices, loop, near
 from ..subdivision.interpolation import BOUNDARY_CORNER
 from ..topology import Topology
 from .checks import one_start, refuse_degenerate_faces
@@ -26,6 +26,8 @@ from .symmetric_problem import SymmetricProblem
 from .symmetric_report import symmetric_measures
 from .symmetric_rounds import SymmetricRounds
 from .symmetric_settings import SymmetricSettings
+
+_KEPT_RINGS = 6  # from the boundary on, over which Loop subdivision passes from interpolating to smoothing
 
 
 class SymmetricDesign:
@@ -135,13 +137,15 @@ class SymmetricDesign:
     def refined(self) -> SymmetricDesign:
         """The design on the mesh refined by Loop subdivision, labels, handles and fixed vertices carried along.
 
-        Vertices keep their places; see :func:`~torchfair.subdivision.interpolate_vertices`.
+        Vertices keep their places on the boundary and where they are fixed, and fewer and fewer away from there: see
+        :func:`~torchfair.subdivision.interpolate_vertices`.
         """
         corners = boundary_corners(self.vertices, self.topology, BOUNDARY_CORNER)
         step = loop(self.topology, boundary="interpolate", corners=corners)
         normals = BoundaryNormals.of(self.vertices, self.topology).at_boundary
+        keep = near(self.topology, self.topology.is_boundary_vertex | self.fixed, _KEPT_RINGS)
         finer = SymmetricDesign(
-            interpolate_vertices(step, self.vertices, normals),
+            interpolate_vertices(step, self.vertices, normals, keep=keep),
             self.principal.refine(step),
             handles=self.handles.tolist(),
             fixed=_carried(step, self.fixed, _on_boundary(self.topology)),

@@ -12,13 +12,16 @@ from ..boundary import boundary_corners
 from ..errors import MeshError
 from ..geometry import vertex_normals
 from ..geometry._ops import dot
+from ..topology import Topology
 from .refinement import Origin, Refinement
 
 _ROUNDS = 40
 BOUNDARY_CORNER = math.radians(40.0)
 
 
-def interpolate_vertices(step: Refinement, vertices: Tensor, normals: Tensor | None = None) -> Tensor:
+def interpolate_vertices(
+    step: Refinement, vertices: Tensor, normals: Tensor | None = None, *, keep: Tensor | None = None
+) -> Tensor:
     """Positions of the fine mesh of one step of Loop subdivision that pass through the coarse vertices.
 
     Approximating schemes move inner vertices by a share of the curvature there, and boundary vertices by another one or
@@ -33,6 +36,8 @@ def interpolate_vertices(step: Refinement, vertices: Tensor, normals: Tensor | N
             of the boundary: where it turns by more than 40 degrees.
         vertices: (V, 3) positions of the coarse mesh.
         normals: (V, 3) unit normals at boundary vertices; by default vertex normals.
+        keep: (V,) from 0 to 1, to what extent inner vertices keep their places; by default all do. Where it is 0 the
+            scheme is as it is and smooths what is uneven, see :func:`near`.
 
     Returns:
         (V', 3) float64 on the CPU.
@@ -53,11 +58,12 @@ def interpolate_vertices(step: Refinement, vertices: Tensor, normals: Tensor | N
             f"the boundary vertices {first_few(moved, len(moved))} move, or there is more than one step: take one step "
             'of Loop subdivision with boundary="interpolate"'
         )
-    inner = step.apply(_control_mesh(step, places))
+    kept = torch.ones(count, 1, dtype=places.dtype) if keep is None else keep.detach().to(places)[:, None]
+    inner = step.apply(_control_mesh(step, places, kept))
     is_new_boundary = step.topology.is_boundary_vertex.clone()
     is_new_boundary[:count] = False
     fine = torch.where(step.topology.is_boundary_vertex[:, None], fine, inner)
-    fine[:count] = places
+    fine[:count] = torch.where((kept == 1.0) | on_boundary[:, None], places, fine[:count])
     kinds, numbers = step.vertex_origins.unbind(1)
     rows = torch.nonzero(is_new_boundary & (kinds == Origin.EDGE)).squeeze(1)
     edges = coarse.edges[numbers[rows]]
@@ -67,15 +73,31 @@ def interpolate_vertices(step: Refinement, vertices: Tensor, normals: Tensor | N
     return fine
 
 
-def _control_mesh(step: Refinement, places: Tensor) -> Tensor:
-    """Vertices that the step takes to ``places`` inside; on the boundary shifted like the inner vertices beside."""
+def near(topology: Topology, vertices: Tensor, rings: int) -> Tensor:
+    """(V,) float64: 1 at chosen ``vertices`` (V,) bool and beside them, fading smoothly to 0 over so many rings."""
+    v, w = topology.edges.unbind(1)
+    distance = torch.where(vertices, 0, rings + 1)
+    for ring in range(rings):
+        reached = distance == ring
+        ends = torch.cat([w[reached[v]], v[reached[w]]])
+        distance[ends] = distance[ends].clamp(max=ring + 1)
+    faded = (distance - 1).clamp(0, rings).to(torch.float64) / rings
+    return 0.5 * (1.0 + torch.cos(math.pi * faded))
+
+
+def _control_mesh(step: Refinement, places: Tensor, kept: Tensor) -> Tensor:
+    """Vertices that the step takes to ``places`` inside, to the extent ``kept`` (V, 1).
+
+    On the boundary they are shifted like the inner vertices beside.
+    """
     coarse = step.coarse
     inside = (~coarse.is_boundary_vertex & (coarse.valences > 0))[:, None].to(places.dtype)
     v, w = coarse.edges.unbind(1)
     number = torch.zeros_like(inside).index_add_(0, v, inside[w]).index_add_(0, w, inside[v]).clamp_min(1.0)
     control = places
     for _ in range(_ROUNDS):
-        shift = (control - places + places - step.apply(control)[: coarse.num_vertices]) * inside
+        missed = places - step.apply(control)[: coarse.num_vertices]
+        shift = (control - places + missed) * inside * kept
         beside = torch.zeros_like(shift).index_add_(0, v, shift[w]).index_add_(0, w, shift[v]) / number
         control = places + torch.where(inside > 0, shift, beside)
     return control
