@@ -64,7 +64,7 @@ def edited(design: SymmetricDesign, places: Handles) -> tuple[SymmetricDesign, f
     answer = copy.copy(design)  # shares what is compiled
     answer.runs = []
     begin, processor = time.perf_counter(), time.process_time()
-    answer.move(places)
+    answer.move(places, rounds=1)
     return answer, time.perf_counter() - begin, time.process_time() - processor
 
 
@@ -86,7 +86,7 @@ def steps_to_residual(design: SymmetricDesign, places: Handles) -> int | None:
 
     problem.admits = watched  # type: ignore[method-assign]
     try:
-        answer.move(places, count)
+        answer.move(places, count, rounds=1)
     finally:
         problem.admits = admits  # type: ignore[method-assign]
     seen[-1] = largest_residual(answer, answer.vertices)
