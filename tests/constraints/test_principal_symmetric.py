@@ -9,7 +9,12 @@ import torch
 from helpers import DOUBLE
 
 from torchfair import ShapeError
-from torchfair.constraints import coplanar_terms, cospherical_terms, displacement_fairness_terms
+from torchfair.constraints import (
+    coplanar_terms,
+    cospherical_terms,
+    displacement_fairness_terms,
+    even_star_terms,
+)
 from torchfair.constraints import principal_symmetric as ps
 from torchfair.constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
 from torchfair.constraints.lifted_principal_symmetric import lifted_blocks, lifted_principal_symmetric_terms
@@ -141,6 +146,22 @@ def test_ends_that_are_no_stars_are_refused() -> None:
     edges = lattice("catenoid")[1]
     with pytest.raises(ShapeError, match="stars"):
         coplanar_terms(edges.topology.edges[edges.mask], edges.stars(), weight=1.0)
+
+
+def test_unevenness_is_the_shear_of_a_star_and_falls_with_the_spacing() -> None:
+    places = torch.tensor([[0.0, 0], [2, 0], [1, 1], [-1, 1], [-2, 0], [-1, -1], [1, -1]], dtype=DOUBLE)
+    flat = torch.cat([places, torch.zeros(7, 1, dtype=DOUBLE)], dim=1)
+    assert ps.unevenness(flat[None]).abs().max() == 0.0
+    sheared = flat.clone()
+    sheared[:, 0] += 0.3 * sheared[:, 1]
+    torch.testing.assert_close(ps.unevenness(7.0 * sheared[None]), torch.tensor([[0.15, -0.15]], dtype=DOUBLE))
+    largest = []
+    for cells in (10, 20, 40):
+        mesh = principal_triangles(Enneper(0.7), cells, cells, ends="zigzag")
+        (term,) = even_star_terms(principal_edges_of_lattice(mesh, "u").stars(), weight=1.0)
+        largest.append(float(term.values(term.arguments({"vertices": mesh.vertices})).abs().max()))
+    assert largest[0] / largest[1] > 1.8
+    assert largest[1] / largest[2] > 1.8
 
 
 def test_displacement_fairness_is_zero_at_translations_and_feels_a_pulled_vertex() -> None:

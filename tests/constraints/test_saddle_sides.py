@@ -8,7 +8,8 @@ import pytest
 import torch
 from helpers import DOUBLE, random_rotation
 
-from torchfair.constraints.saddle_sides import SaddleSides, angle_excess, side_curvatures, star_stencil
+from torchfair.constraints.principal_symmetric import star_stencil
+from torchfair.constraints.saddle_sides import SaddleSides, angle_excess, side_curvatures
 from torchfair.geometry import corner_angles
 from torchfair.principal import principal_edges_of_lattice
 from torchfair.principal.spheres import spheres_through

@@ -8,7 +8,8 @@ import pytest
 import torch
 from helpers import DOUBLE, random_rotation, tetrahedron
 
-from torchfair import MeshError, ShapeError
+from torchfair import MeshError, ShapeError, Topology
+from torchfair.constraints.principal_symmetric import star_stencil, unevenness
 from torchfair.formfinding import SymmetricDesign, SymmetricSettings, principal_symmetric, strip_normals
 from torchfair.formfinding.symmetric_report import condition_residuals
 from torchfair.geometry import vertex_normals
@@ -79,6 +80,37 @@ def test_exact_starts_stay_where_they_are() -> None:
     result = principal_symmetric(vertices, edges)
     assert result.levels[0].steps <= 2
     assert float((result.vertices - vertices).abs().max()) < 1e-12
+
+
+def quads_cut_row_by_row(rows: int, columns: int) -> tuple[torch.Tensor, PrincipalEdges]:
+    """Principal quads of a torus, those of every other row cut by the other diagonal; circles of latitude principal."""
+    rings = [2.0 + math.cos(2 * math.pi * i / rows) for i in range(rows)]
+    heights = [math.sin(2 * math.pi * i / rows) for i in range(rows)]
+    turns = [2 * math.pi * j / columns for j in range(columns)]
+    points = [[r * math.cos(t), r * math.sin(t), z] for r, z in zip(rings, heights, strict=True) for t in turns]
+    faces, marked = [], set()
+    for i in range(rows):
+        for j in range(columns):
+            a, b = i * columns + j, i * columns + (j + 1) % columns
+            d, c = (i + 1) % rows * columns + j, (i + 1) % rows * columns + (j + 1) % columns
+            faces += [[a, b, d], [b, c, d]] if i % 2 else [[a, b, c], [a, c, d]]
+            marked.add((min(a, b), max(a, b)))
+    topology = Topology.from_faces(faces)
+    mask = torch.tensor([(min(v, w), max(v, w)) in marked for v, w in topology.edges.tolist()])
+    return torch.tensor(points, dtype=DOUBLE), PrincipalEdges(topology, mask).check()
+
+
+def test_principal_quads_cut_by_diagonals_lose_their_shear() -> None:
+    vertices, edges = quads_cut_row_by_row(12, 16)
+    stencil = star_stencil(edges.stars())
+    settings = SymmetricSettings(evenness_weight=3.0)
+    result = principal_symmetric(vertices, edges, settings=settings)
+    assert float(unevenness(vertices[stencil]).abs().max()) > 0.2
+    assert float(unevenness(result.vertices[stencil]).abs().max()) < 1e-3
+    assert result.after["energy_over_curvature"] < 1.2
+    assert largest(result.vertices, edges) < 1e-8
+    assert result.after["saddle_side_share"] == 1.0
+    assert result.after["crossing_pyramids_negative"] == 0.0
 
 
 def test_unit_and_place_do_not_matter() -> None:

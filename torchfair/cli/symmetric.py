@@ -52,6 +52,8 @@ def add_parser(subparsers: Any) -> None:
     add("--levels", type=count, default=0, metavar="N", help="refine and optimise again, so many times (default 0)")
     add("--energy", type=non_negative, default=0.0, metavar="W", help="weight of E beside the conditions (default 0)")
     add("--fairness", type=non_negative, default=1.0, metavar="W", help="weight of fairness (default 1)")
+    add("--evenness", type=non_negative, default=0.0, metavar="W", help="weight of symmetric stars; 3 for quads cut by "
+        "diagonals, which start sheared (default 0)")  # fmt: skip
     add("--closeness", type=non_negative, default=1.0, metavar="W", help="weight of closeness to --reference "
         "(default 1)")  # fmt: skip
     add("--strips", type=non_negative, metavar="HEIGHT", help="write strips of this height orthogonal to the mesh "
@@ -126,6 +128,7 @@ def read_settings(arguments: argparse.Namespace) -> SymmetricSettings:
         boundary=arguments.boundary,
         energy_weight=arguments.energy,
         fairness_weight=arguments.fairness,
+        evenness_weight=arguments.evenness,
         closeness_weight=arguments.closeness,
         formulation=arguments.formulation,
         most_steps=arguments.steps,

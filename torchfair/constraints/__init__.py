@@ -21,6 +21,7 @@ from .planarity import planarity_terms as planarity_terms
 from .principal_symmetric import between_stars as between_stars
 from .principal_symmetric import coplanar_terms as coplanar_terms
 from .principal_symmetric import cospherical_terms as cospherical_terms
+from .principal_symmetric import even_star_terms as even_star_terms
 from .principal_symmetric import sphere_blocks as sphere_blocks
 from .saddle_sides import SaddleSides as SaddleSides
 from .stars import pyramid_terms as pyramid_terms

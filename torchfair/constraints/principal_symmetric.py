@@ -121,6 +121,38 @@ def coplanar_terms(
     ]
 
 
+def unevenness(x: Tensor) -> Tensor:
+    """How far w2 and w3, and w5 and w6, of ``x`` (n, 7, 3) are from being level along the principal polyline, (n, 2).
+
+    The sum of both spokes along w1 - w4, over the length of that: 0 where the star is its own mirror image.
+    """
+    spokes = x[:, 1:] - x[:, :1]
+    along = spokes[:, 0] - spokes[:, 3]
+    sums = torch.stack([spokes[:, 1] + spokes[:, 2], spokes[:, 4] + spokes[:, 5]], dim=1)
+    return dot(sums, along[:, None]) / dot(along, along)[:, None].clamp_min(1e-24)
+
+
+def even_star_terms(stars: PrincipalStars, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
+    """Fairness that undoes shear: stars tend to be symmetric to their principal polyline's normal plane.
+
+    Principal quads cut by diagonals are sheared by half an edge; spheres and coplanar normals do not see that.
+    Vanishes with the edge length on lattices of principal curvature lines.
+
+    Args:
+        stars: Regular vertices.
+        weight: Dimensionless.
+        block: Name of the vertex block.
+    """
+    return [ElementTerm("even stars", unevenness, [(block, star_stencil(stars))], weight=weight, batched=True)]
+
+
+def star_stencil(stars: PrincipalStars) -> Tensor:
+    """(R, 7) vertices v, w1, ..., w6 of every star."""
+    first, fourth = stars.principal.unbind(1)
+    w2, w3, w5, w6 = stars.cospherical.unbind(1)
+    return torch.stack([stars.vertices, first, w2, w3, fourth, w5, w6], dim=1)
+
+
 def between_stars(edges: Tensor, stars: PrincipalStars) -> Tensor:
     """Those of ``edges`` (n, 2) both of whose ends are stars."""
     return edges[torch.isin(edges, stars.vertices).all(1)]

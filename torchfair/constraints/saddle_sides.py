@@ -28,17 +28,11 @@ from ..principal.principal_edges import PrincipalStars
 from ..principal.spheres import spheres_through
 from ..projection import ElementTerm
 from ..projection.layout import State
+from .principal_symmetric import star_stencil
 
 NEGATIVE = 1e-9  # radians by which the angle sum is above 2 pi where curvature counts as negative
 _RECONSIDERED = 8.0  # factor of a changed preference
 _FLATTEST = 1e-2  # curvature times edge length below which a sphere counts as this
-
-
-def star_stencil(stars: PrincipalStars) -> Tensor:
-    """(R, 7) vertices v, w1, ..., w6 of every star."""
-    first, fourth = stars.principal.unbind(1)
-    w2, w3, w5, w6 = stars.cospherical.unbind(1)
-    return torch.stack([stars.vertices, first, w2, w3, fourth, w5, w6], dim=1)
 
 
 def angle_excess(x: Tensor) -> Tensor:

@@ -102,6 +102,7 @@ class SymmetricProblem:
             *self._conditions(weight),
             *self.sides.terms(weight=settings.saddle_weight),
             *c.displacement_fairness_terms(self.base, self.topology, weight=settings.fairness_weight),
+            *c.even_star_terms(self.stars, weight=settings.evenness_weight),
             *self._anchors(),
             *self._handles(),
             *self._closeness(),

@@ -7,8 +7,8 @@ import math
 import torch
 from torch import Tensor
 
-from ..constraints.principal_symmetric import between_stars, star_numbers
-from ..constraints.saddle_sides import NEGATIVE, angle_excess, star_stencil
+from ..constraints.principal_symmetric import between_stars, star_numbers, star_stencil
+from ..constraints.saddle_sides import NEGATIVE, angle_excess
 from ..energies import normal_variation, total_absolute_curvature
 from ..geometry import corner_angles, edge_lengths
 from ..geometry._ops import cross, dot

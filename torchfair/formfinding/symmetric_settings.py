@@ -27,6 +27,8 @@ class SymmetricSettings:
         tight_weight: Their weight once it is found; at last they are met exactly, without any other aim.
         fairness_weight: Weight of squared umbrella vectors of the displacement from the start of the level: handles
             pull their surroundings along.
+        evenness_weight: Weight of stars being symmetric along their principal polyline, which undoes shear; 3 for
+            principal quads cut by diagonals.
         anchor_weight: Weight of the squared displacement itself: how far around a handle the mesh follows, about the
             inverse fourth root of its quotient with ``fairness_weight`` in edges.
         handle_weight: Weight of the squared distance of handles from their targets.
@@ -49,6 +51,7 @@ class SymmetricSettings:
     constraint_weight: float = 1e2
     tight_weight: float = 1e4
     fairness_weight: float = 1.0
+    evenness_weight: float = 0.0
     anchor_weight: float = 1e-5
     handle_weight: float = 1e2
     closeness_weight: float = 1.0
