@@ -242,6 +242,9 @@ def test_an_edit_from_a_warm_state_is_the_same_design() -> None:
     assert len(design.runs) - runs <= 4
     with pytest.raises(MeshError, match="no handle"):
         design.move({far + 1: [0.0, 0.0, 0.0]})
+    for place in ([math.nan, 0.0, 0.0], [1.0]):
+        with pytest.raises(ShapeError, match="finite"):
+            design.move({vertex: place})
 
 
 def test_singular_vertices_are_left_out() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..geometry import umbrella_vectors, vertex_normals
+from ..geometry import second_differences, umbrella_vectors, vertex_normals
 from ..polylines import straight_triples
 from ..projection import ElementTerm
 from ..projection.layout import State
@@ -99,22 +99,17 @@ def displacement_fairness_terms(
     At boundary vertices second differences along the boundary stand for umbrella vectors. Zero at ``base`` and
     wherever it is translated to.
     """
+    umbrellas = umbrella_vectors(base, topology)
     terms = [
-        _offset_term("fairness", umbrella_offset, stencil, umbrella_of(base, stencil), weight, block)
+        _offset_term("fairness", umbrella_offset, stencil, umbrellas[stencil[:, 0]], weight, block)
         for stencil in closed_star_stencils(topology)
     ]
     triples = straight_triples(topology)
     triples = triples[topology.is_boundary_vertex[triples[:, 1]]]
     if triples.numel():
-        start, middle, end = base[triples].unbind(1)
-        target = 0.5 * (start + end) - middle
+        target = 0.5 * second_differences(base, triples)
         terms.append(_offset_term("boundary fairness", difference_offset, triples, target, weight, block))
     return terms
-
-
-def umbrella_of(vertices: Tensor, stencil: Tensor) -> Tensor:
-    """(n, 3) umbrella vectors of stars ``stencil`` (n, 1 + k)."""
-    return vertices[stencil[:, 1:]].mean(1) - vertices[stencil[:, 0]]
 
 
 def difference_offset(x: Tensor, target: Tensor) -> Tensor:

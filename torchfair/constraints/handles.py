@@ -12,8 +12,10 @@ def offset(x: Tensor, target: Tensor) -> Tensor:
     return x[0] - target
 
 
-def handle_terms(vertices: Tensor, targets: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
-    """Pulls ``vertices`` (n,) to ``targets`` (n, 3)."""
+def handle_terms(
+    vertices: Tensor, targets: Tensor, *, weight: float, block: str = "vertices", name: str = "handles"
+) -> list[ElementTerm]:
+    """Pulls ``vertices`` (n,) to ``targets`` (n, 3); ``name`` is that in the residual table."""
     if not vertices.numel():
         return []
-    return [ElementTerm("handles", offset, [(block, vertices[:, None])], data=(targets,), weight=weight, linear=True)]
+    return [ElementTerm(name, offset, [(block, vertices[:, None])], data=(targets,), weight=weight, linear=True)]

@@ -30,7 +30,7 @@ from ..projection import ElementTerm
 from ..projection.layout import State
 from .principal_symmetric import star_stencil
 
-NEGATIVE = 1e-9  # radians by which the angle sum is above 2 pi where curvature counts as negative
+_NEGATIVE = 1e-9  # radians by which the angle sum is above 2 pi where curvature counts as negative
 _RECONSIDERED = 8.0  # factor of a changed preference
 _FLATTEST = 1e-2  # curvature times edge length below which a sphere counts as this
 
@@ -41,6 +41,17 @@ def angle_excess(x: Tensor) -> Tensor:
     after = spokes.roll(-1, 1)
     angles = torch.atan2(norm(cross(spokes, after)), dot(spokes, after))
     return angles.sum(1) - 2.0 * math.pi
+
+
+def is_negative(x: Tensor) -> Tensor:
+    """(n,) bool: stars ``x`` (n, 7, 3) of negative curvature, with an angle sum above 2 pi."""
+    return angle_excess(x) > _NEGATIVE
+
+
+def beyond_tangent_plane(x: Tensor) -> Tensor:
+    """(n,) bool: w1 and w4 lie on the other side of the tangent plane of the sphere than w2, w3, w5, w6."""
+    sides, spheres = side_curvatures(x)
+    return _beyond(sides[:, :2], spheres)
 
 
 def side_curvatures(x: Tensor) -> tuple[Tensor, Tensor]:
@@ -100,7 +111,7 @@ class SaddleSides:
         excess = angle_excess(x)
         self.is_saddle = (excess > 0.0) & (torch.minimum(keep, turn) <= self._preference * excess / (area * scale))
         self._data = (self.is_saddle.to(x.dtype), sign / scale, 1.0 / (scale * scale * area))
-        return self.count_wrong(vertices)
+        return int(_are_wrong(sides, spheres, excess).sum())
 
     def forget(self) -> None:
         """Back to decisions by the smaller change alone."""
@@ -112,15 +123,10 @@ class SaddleSides:
         factor = torch.where(self.is_saddle, 1.0 / _RECONSIDERED, _RECONSIDERED).to(self._preference)
         self._preference = torch.where(wrong, factor * self._preference, self._preference)
 
-    def are_negative(self, vertices: Tensor) -> Tensor:
-        """(R,) bool: stars with an angle sum above 2 pi at ``vertices`` (V, 3)."""
-        return angle_excess(vertices[self.stencil]) > NEGATIVE
-
     def are_wrong(self, vertices: Tensor) -> Tensor:
         """(R,) bool: stars with an angle sum above 2 pi that are not saddle-shaped at ``vertices`` (V, 3)."""
-        sides, spheres = side_curvatures(vertices[self.stencil])
-        beyond = (torch.sign(spheres)[:, None] * sides < 0.0).all(1)
-        return self.are_negative(vertices) & ~beyond
+        x = vertices[self.stencil]
+        return _are_wrong(*side_curvatures(x), angle_excess(x))
 
     def count_wrong(self, vertices: Tensor) -> int:
         """How many stars are wrong at ``vertices`` (V, 3), see :meth:`are_wrong`."""
@@ -145,6 +151,15 @@ class SaddleSides:
         """One element for each star."""
         stencil = [(self.block, self.stencil)]
         return [ElementTerm("saddle sides", self.lacking, stencil, weight=weight, refresh=self, batched=True)]
+
+
+def _beyond(sides: Tensor, spheres: Tensor) -> Tensor:
+    """(n,) bool: all ``sides`` (n, k) curve against the sphere."""
+    return (torch.sign(spheres)[:, None] * sides < 0.0).all(1)
+
+
+def _are_wrong(sides: Tensor, spheres: Tensor, excess: Tensor) -> Tensor:
+    return (excess > _NEGATIVE) & ~_beyond(sides, spheres)
 
 
 def _sign(values: Tensor) -> Tensor:

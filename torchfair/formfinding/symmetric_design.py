@@ -21,6 +21,7 @@ from ..subdivision import Refinement, interpolate_vertices, loop, near
 from ..subdivision.interpolation import BOUNDARY_CORNER
 from ..topology import Topology
 from .checks import one_start, refuse_degenerate_faces
+from .handles import read_handles
 from .strip_normals import strip_normals
 from .symmetric_problem import SymmetricProblem
 from .symmetric_report import symmetric_measures
@@ -48,9 +49,9 @@ class SymmetricDesign:
         runs: Every run of guided projection so far, in normalised units.
 
     Raises:
-        ShapeError: vertices or masks do not fit the topology.
-        MeshError: vertices are not finite, a face has no area, a handle is fixed, or there is no star to impose
-            conditions on.
+        ShapeError: vertices do not fit the topology.
+        MeshError: the mask of fixed vertices does not fit, vertices are not finite, a face has no area, a handle is
+            fixed, or there is no star to impose conditions on.
     """
 
     def __init__(
@@ -123,14 +124,16 @@ class SymmetricDesign:
         """Moves handles to ``targets`` and solves; see :meth:`solve`.
 
         Raises:
+            ShapeError: a target is not a point with finite coordinates.
             MeshError: a vertex is none of the handles.
         """
         rows = {vertex: row for row, vertex in enumerate(self.handles.tolist())}
         moved = self.problem.targets.clone()
-        for vertex, place in targets.items():
+        vertices, places = read_handles(targets, self.topology)
+        for vertex, place in zip(vertices.tolist(), self.normalisation.apply(places), strict=True):
             if vertex not in rows:
                 raise MeshError(f"vertex {vertex} is no handle of this design: handles are {list(rows)[:10]}")
-            moved[rows[vertex]] = self.normalisation.apply(torch.as_tensor(place, dtype=moved.dtype))
+            moved[rows[vertex]] = place
         self.problem.targets = moved
         return self.solve(callback, rounds=rounds)
 

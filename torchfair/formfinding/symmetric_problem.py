@@ -98,12 +98,13 @@ class SymmetricProblem:
         if aim is Aim.EXACT:
             return self._conditions(settings.constraint_weight)
         weight = settings.constraint_weight if aim is Aim.SHAPE else settings.tight_weight
+        everywhere = torch.arange(self.topology.num_vertices)
         return [
             *self._conditions(weight),
             *self.sides.terms(weight=settings.saddle_weight),
             *c.displacement_fairness_terms(self.base, self.topology, weight=settings.fairness_weight),
             *c.even_star_terms(self.stars, weight=settings.evenness_weight),
-            *self._anchors(),
+            *c.handle_terms(everywhere, self.base, weight=settings.anchor_weight, name="anchors"),
             *self._handles(),
             *self._closeness(),
             *self._energy(),
@@ -119,14 +120,6 @@ class SymmetricProblem:
             *c.cospherical_terms(self.stars, weight=weight),
             *c.coplanar_terms(self.edges, self.stars, weight=weight),
         ]
-
-    def _anchors(self) -> list[ElementTerm]:
-        if not self.settings.anchor_weight:
-            return []
-        everywhere = torch.arange(self.topology.num_vertices)
-        stencil = [("vertices", everywhere[:, None])]
-        weight = self.settings.anchor_weight
-        return [ElementTerm("anchors", offset, stencil, data=(self.base,), weight=weight, linear=True)]
 
     def _handles(self) -> list[ElementTerm]:
         if not self.handles.numel():

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ..constraints.principal_symmetric import between_stars, star_numbers, star_stencil
-from ..constraints.saddle_sides import NEGATIVE, angle_excess
+from ..constraints.saddle_sides import beyond_tangent_plane, is_negative
 from ..energies import normal_variation, total_absolute_curvature
 from ..geometry import corner_angles, edge_lengths
 from ..geometry._ops import cross, dot
@@ -55,8 +55,8 @@ def symmetric_measures(
     """
     topology = principal.topology
     residuals = condition_residuals(vertices, principal, stars)
-    negative = angle_excess(vertices[star_stencil(stars)]) > NEGATIVE
-    right = saddle_sides_right(vertices, stars)
+    x = vertices[star_stencil(stars)]
+    negative, right = is_negative(x), beyond_tangent_plane(x)
     crossing = pyramid_self_intersections(vertices, topology) > 0
     energy = float(normal_variation(vertices, topology))
     curvature = float(total_absolute_curvature(vertices, topology))
@@ -78,11 +78,3 @@ def symmetric_measures(
         "smallest_angle_degrees": math.degrees(float(angles.min())),
         "largest_handle_distance": float(away.max()) if away.numel() else 0.0,
     }
-
-
-def saddle_sides_right(vertices: Tensor, stars: PrincipalStars) -> Tensor:
-    """(R,) bool: both principal neighbours lie on the other side of the tangent plane than the cospherical ones."""
-    spheres = star_spheres(vertices, stars)
-    spokes = vertices[stars.principal] - vertices[stars.vertices, None]
-    heights = dot(spheres.normals[:, None], spokes)
-    return (spheres.curvatures[:, None] * heights < 0.0).all(1)

@@ -8,13 +8,14 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from ..constraints.saddle_sides import beyond_tangent_plane, is_negative
 from ..principal import PrincipalEdges
 from ..projection import ProjectionResult, ProjectionSettings, Status
 from ..projection.iteration import Callback
 from ..projection.layout import State
 from ..stars import pyramid_self_intersections
 from .symmetric_problem import Aim, SymmetricProblem
-from .symmetric_report import condition_residuals, saddle_sides_right
+from .symmetric_report import condition_residuals
 
 _EXACT = ProjectionSettings(
     max_iterations=25,
@@ -97,12 +98,11 @@ class SymmetricRounds:
         shape = self.settings.projection
         if first and self._approach():
             return True
-        wrong = self._decide()
+        self._decide()
         if self._run(Aim.SHAPE, shape):
             return True
-        if first:
-            wrong = self._decide()
-            if wrong and self._run(Aim.SHAPE, shape):
+        if first and self._decide():
+            if self._run(Aim.SHAPE, shape):
                 return True
             self._decide()
         tight = replace(shape, max_iterations=_TIGHT_STEPS)
@@ -163,6 +163,6 @@ class SymmetricRounds:
         problem = self.problem
         if not problem.sides.count_wrong(vertices):
             return 0  # saddle-shaped stars of this kind have simple pyramids
-        negative = problem.sides.are_negative(vertices)
+        x = vertices[problem.sides.stencil]
         crossing = pyramid_self_intersections(vertices, problem.topology)[problem.stars.vertices] > 0
-        return int((negative & (crossing | ~saddle_sides_right(vertices, problem.stars))).sum())
+        return int((is_negative(x) & (crossing | ~beyond_tangent_plane(x))).sum())

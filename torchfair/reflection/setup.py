@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -98,19 +98,13 @@ class ReflectionSetup:
 
     def flat(self, vertices: Tensor, topology: Topology, *, antialias: bool = False) -> Pictures:
         """Pictures of a mesh (*batch, V, 3) of plane mirrors, one for every face."""
-        picture = render_reflection(
-            vertices,
-            topology,
-            self.camera,
-            self._surroundings,
-            size=self.size,
-            supersampling=self.supersampling,
-            antialias=antialias,
-        )
-        return _split(picture.image, picture.coverage)
+        return self._render(vertices, topology, antialias=antialias)
 
     def smooth(self, vertices: Tensor, topology: Topology, normals: Tensor | None = None) -> Pictures:
         """Pictures of a mesh (*batch, V, 3) that mirrors with blended normals, by default its vertex normals."""
+        return self._render(vertices, topology, shading="smooth", normals=normals)
+
+    def _render(self, vertices: Tensor, topology: Topology, **shading: Any) -> Pictures:
         picture = render_reflection(
             vertices,
             topology,
@@ -118,8 +112,7 @@ class ReflectionSetup:
             self._surroundings,
             size=self.size,
             supersampling=self.supersampling,
-            shading="smooth",
-            normals=normals,
+            **shading,
         )
         return _split(picture.image, picture.coverage)
 
