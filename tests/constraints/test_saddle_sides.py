@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import pytest
 import torch
 from helpers import DOUBLE, random_rotation
+from torch import Tensor
 
 from torchfair.constraints.principal_symmetric import star_stencil
-from torchfair.constraints.saddle_sides import SaddleSides, angle_excess, side_curvatures
+from torchfair.constraints.saddle_sides import SaddleSides
+from torchfair.constraints.side_curvatures import (
+    angle_excess,
+    angle_excess_derivative,
+    side_curvatures,
+    side_curvatures_derivative,
+)
 from torchfair.geometry import corner_angles
 from torchfair.principal import principal_edges_of_lattice
 from torchfair.principal.spheres import spheres_through
+from torchfair.projection.term import differentiate
 from torchfair.shapes import Catenoid, Torus, principal_triangles
 from torchfair.stars import pyramid_self_intersections
 
@@ -81,21 +90,27 @@ def test_decisions_and_what_is_lacking() -> None:
     mesh = principal_triangles(Catenoid(), 8, 14, ends="zigzag")
     stars = principal_edges_of_lattice(mesh, "u").stars()
     sides = SaddleSides(stars)
+    assert sides.decide(mesh.vertices) == len(stars.vertices)  # nothing was decided before
     assert sides.decide(mesh.vertices) == 0
+    assert sides.count_wrong(mesh.vertices) == 0
     assert bool(sides.is_saddle.all())
     (term,) = sides.terms(weight=1.0)
     state = {"vertices": mesh.vertices}
-    assert float(term.values(term.arguments(state)).abs().max()) == 0.0
+    assert float(term.missed(term.values(term.arguments(state))).max()) == 0.0
+    assert float(term.values(term.arguments(state)).min()) < 0.0  # what holds has a margin that steps know
     wide = SaddleSides(stars, margin=100.0)
     values = wide.terms(weight=1.0)[0].values(wide.terms(weight=1.0)[0].arguments(state))
-    assert float(values.min()) >= 0.0
     assert float(values.max()) > 0.0
+    (blind,) = sides.terms(weight=1.0, ahead=False)
+    assert torch.equal(blind.values(blind.arguments(state)), term.missed(term.values(term.arguments(state))))
+    (slight,) = wide.terms(weight=1.0, share=1e-3)
+    assert float(slight.missed(slight.values(slight.arguments(state))).max()) == 0.0
     # Pulled to the other side of the tangent plane, a principal neighbour makes stars lack something.
     bent = mesh.vertices.clone()
     inner = stars.principal[len(stars.vertices) // 2, 0]
     bent[inner] *= 1.15
     assert sides.count_wrong(bent) > 0
-    assert float(term.values(term.arguments({"vertices": bent})).abs().max()) > 0.0
+    assert float(term.values(term.arguments({"vertices": bent})).max()) > 0.0
 
 
 def test_a_star_of_small_excess_is_to_lose_it_and_one_of_large_excess_is_to_be_a_saddle() -> None:
@@ -110,3 +125,51 @@ def test_a_star_of_small_excess_is_to_lose_it_and_one_of_large_excess_is_to_be_a
     values = term.values(term.arguments({"vertices": mesh.vertices}))
     assert bool((values[~sides.is_saddle][:, :7] == 0.0).all())
     assert bool((values[sides.is_saddle][:, 7] == 0.0).all())
+
+
+def by_autograd(function: Callable[[Tensor], Tensor], x: Tensor) -> Tensor:
+    """Derivative by the spokes of a function of stars (n, 7, 3) with values (n,)."""
+    x = x.clone().requires_grad_()
+    (gradient,) = torch.autograd.grad(function(x).sum(), x)
+    return gradient[:, 1:]
+
+
+def test_closed_derivatives_are_those_of_automatic_differentiation() -> None:
+    generator = torch.Generator().manual_seed(5)
+    mesh = principal_triangles(Torus(2.0, 1.0), 12, 16, along="u")
+    noise = 0.03 * torch.randn(mesh.vertices.shape, dtype=DOUBLE, generator=generator)
+    sides = SaddleSides(principal_edges_of_lattice(mesh, "u").stars())
+    x = (mesh.vertices + noise)[sides.stencil]
+    by_sides, by_spheres = side_curvatures_derivative(x)
+    for number in range(6):
+        expected = by_autograd(lambda y, i=number: side_curvatures(y)[0][:, i], x)
+        assert float((by_sides[:, number] - expected).abs().max()) < 1e-10 * float(expected.abs().max())
+    expected = by_autograd(lambda y: side_curvatures(y)[1], x)
+    assert float((by_spheres - expected).abs().max()) < 1e-10 * float(expected.abs().max())
+    expected = by_autograd(angle_excess, x)
+    assert float((angle_excess_derivative(x) - expected).abs().max()) < 1e-11
+
+
+def test_closed_derivatives_are_finite_on_flat_and_degenerate_stars() -> None:
+    turn = torch.arange(6, dtype=DOUBLE) * math.pi / 3.0
+    flat = torch.zeros(1, 7, 3, dtype=DOUBLE)
+    flat[0, 1:, 0], flat[0, 1:, 1] = torch.cos(turn), torch.sin(turn)
+    collapsed = flat * torch.tensor([1.0, 0.0, 0.0], dtype=DOUBLE)
+    for star in (flat, collapsed, torch.zeros_like(flat)):
+        for part in (*side_curvatures_derivative(star), angle_excess_derivative(star)):
+            assert bool(torch.isfinite(part).all())
+    expected = by_autograd(angle_excess, flat)
+    assert float((angle_excess_derivative(flat) - expected).abs().max()) < 1e-12
+
+
+def test_derivative_of_the_terms() -> None:
+    mesh = principal_triangles(Torus(2.0, 1.0), 12, 16, along="u")
+    sides = SaddleSides(principal_edges_of_lattice(mesh, "u").stars(), margin=0.5)
+    sides.decide(mesh.vertices)
+    assert 0 < int(sides.is_saddle.sum()) < len(sides.is_saddle)
+    state = {"vertices": mesh.vertices}
+    for ahead in (True, False):
+        (term,) = sides.terms(weight=1.0, share=0.7, ahead=ahead)
+        arguments = term.arguments(state)
+        _, expected = differentiate(term.residual, arguments, 1, batched=True)
+        assert float((term.jacobians(arguments) - expected).abs().max()) < 1e-10 * float(expected.abs().max())

@@ -183,7 +183,7 @@ def test_handles_that_ask_for_the_impossible_yield_to_the_conditions() -> None:
     middle = int(stars[len(stars) // 2])
     ring = edges.topology.ring_vertices[edges.topology.ring_offsets[middle] :][:6].tolist()
     handles = {v: vertices[v].tolist() for v in ring}
-    handles[middle] = (vertices[middle] + 0.5 * vertex_normals(vertices, edges.topology)[middle]).tolist()
+    handles[middle] = (vertices[middle] + 0.7 * vertex_normals(vertices, edges.topology)[middle]).tolist()
     result = principal_symmetric(vertices, edges, handles=handles)
     assert largest(result.vertices, edges) < 1e-8
     assert result.after["largest_handle_distance"] > 0.05

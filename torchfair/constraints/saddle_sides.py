@@ -18,29 +18,23 @@ A star near a parabolic curve may as well lose its negative curvature; which of 
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
+from functools import partial
 
 import torch
 from torch import Tensor
 
-from ..geometry._ops import cross, dot, norm
+from ..geometry._ops import cross, norm
 from ..principal.principal_edges import PrincipalStars
-from ..principal.spheres import spheres_through
-from ..projection import ElementTerm
+from ..projection import ElementTerm, OneSided, Squares
 from ..projection.layout import State
 from .principal_symmetric import star_stencil
+from .side_curvatures import angle_excess, angle_excess_derivative, side_curvatures, side_curvatures_derivative
 
+SADDLE_SIDES = "saddle sides"
 _NEGATIVE = 1e-9  # radians by which the angle sum is above 2 pi where curvature counts as negative
 _RECONSIDERED = 8.0  # factor of a changed preference
 _FLATTEST = 1e-2  # curvature times edge length below which a sphere counts as this
-
-
-def angle_excess(x: Tensor) -> Tensor:
-    """Angle sum minus 2 pi at the first of the vertices ``x`` (n, 7, 3); positive where curvature is negative."""
-    spokes = x[:, 1:] - x[:, :1]
-    after = spokes.roll(-1, 1)
-    angles = torch.atan2(norm(cross(spokes, after)), dot(spokes, after))
-    return angles.sum(1) - 2.0 * math.pi
 
 
 def is_negative(x: Tensor) -> Tensor:
@@ -52,22 +46,6 @@ def beyond_tangent_plane(x: Tensor) -> Tensor:
     """(n,) bool: w1 and w4 lie on the other side of the tangent plane of the sphere than w2, w3, w5, w6."""
     sides, spheres = side_curvatures(x)
     return _beyond(sides[:, :2], spheres)
-
-
-def side_curvatures(x: Tensor) -> tuple[Tensor, Tensor]:
-    """``2 n.d / |d|^2`` for the spokes d to w1 and w4 and three unit normals n, (n, 6), and curvatures of spheres (n,).
-
-    The normals are those of the sphere of the star, and of the faces v w2 w3 and v w5 w6. The quotient is the curvature
-    of a circle that touches the plane orthogonal to n in v and passes through the neighbour.
-    """
-    spokes = x[:, 1:] - x[:, :1]
-    principal = spokes[:, [0, 3]]
-    sphere = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]])
-    faces = cross(spokes[:, [1, 4]], spokes[:, [2, 5]])
-    faces = faces / norm(faces).clamp_min(1e-12)[..., None]
-    normals = torch.cat([sphere.normals[:, None], faces], dim=1)
-    heights = dot(normals[:, :, None], principal[:, None])
-    return (2.0 * heights / dot(principal, principal).clamp_min(1e-24)[:, None]).flatten(1), sphere.curvatures
 
 
 class SaddleSides:
@@ -95,9 +73,10 @@ class SaddleSides:
         bring the angle sum below 2 pi.
 
         Returns:
-            How many stars with an angle sum above 2 pi are not saddle-shaped.
+            How many stars are to be something else than decided before.
         """
         x = vertices[self.stencil]
+        before = self._data
         sides, spheres = side_curvatures(x)
         scale = torch.maximum(spheres.abs(), sides.abs().mean(1)).clamp_min(_FLATTEST)
         as_it_is, as_faces_ask = _sign(spheres), -_sign(sides.mean(1))
@@ -111,7 +90,10 @@ class SaddleSides:
         excess = angle_excess(x)
         self.is_saddle = (excess > 0.0) & (torch.minimum(keep, turn) <= self._preference * excess / (area * scale))
         self._data = (self.is_saddle.to(x.dtype), sign / scale, 1.0 / (scale * scale * area))
-        return int(_are_wrong(sides, spheres, excess).sum())
+        if not before:
+            return self.is_saddle.shape[0]
+        turned = torch.sign(before[1]) != sign
+        return int(((before[0] > 0.0) ^ self.is_saddle | self.is_saddle & turned).sum())
 
     def forget(self) -> None:
         """Back to decisions by the smaller change alone."""
@@ -138,19 +120,57 @@ class SaddleSides:
             self.decide(state[self.block])
         return self._data
 
-    def lacking(self, x: Tensor, is_saddle: Tensor, per_curvature: Tensor, per_excess: Tensor) -> Tensor:
-        """By how much stars ``x`` (n, 7, 3) miss what they are to be, (n, 8), in curvatures of the star."""
+    def lacking(
+        self, x: Tensor, is_saddle: Tensor, per_curvature: Tensor, per_excess: Tensor, *, share: float
+    ) -> Tensor:
+        """By how much stars ``x`` (n, 7, 3) miss what they are to be, (n, 8), in curvatures of the star.
+
+        Negative where they are; what does not matter is zero.
+        """
         beyond, spheres = side_curvatures(x)
-        sides = torch.relu(self.margin + per_curvature[:, None] * beyond)
-        bent = torch.relu(0.4 * self.margin - per_curvature * spheres)
-        excess = torch.relu(0.4 * self.margin + per_excess * angle_excess(x))
+        margin = share * self.margin
+        sides = margin + per_curvature[:, None] * beyond
+        bent = 0.4 * margin - per_curvature * spheres
+        excess = 0.4 * margin + per_excess * angle_excess(x)
         saddle = torch.cat([sides, bent[:, None]], dim=1)
         return torch.cat([is_saddle[:, None] * saddle, ((1.0 - is_saddle) * excess)[:, None]], dim=1)
 
-    def terms(self, *, weight: float) -> list[ElementTerm]:
-        """One element for each star."""
-        stencil = [(self.block, self.stencil)]
-        return [ElementTerm("saddle sides", self.lacking, stencil, weight=weight, refresh=self, batched=True)]
+    def lacking_derivative(self, x: Tensor, is_saddle: Tensor, per_curvature: Tensor, per_excess: Tensor) -> Tensor:
+        """Jacobians (n, 8, 21) of :meth:`lacking`."""
+        sides, spheres = side_curvatures_derivative(x)
+        saddle = torch.cat([sides, -spheres[:, None]], dim=1) * (is_saddle * per_curvature)[:, None, None, None]
+        other = ((1.0 - is_saddle) * per_excess)[:, None, None] * angle_excess_derivative(x)
+        by_spokes = torch.cat([saddle, other[:, None]], dim=1)
+        return torch.cat([-by_spokes.sum(2, keepdim=True), by_spokes], dim=2).flatten(2)
+
+    def terms(self, *, weight: float, share: float = 1.0, ahead: bool = True) -> list[ElementTerm]:
+        """Inequalities of every star.
+
+        Args:
+            weight: Dimensionless.
+            share: Of the margin.
+            ahead: Whether steps heed inequalities that hold and would not hold after them. Otherwise stars may easily
+                become something else than decided.
+        """
+        lacking = partial(self.lacking, share=share)
+
+        def broken(*arguments: Tensor) -> Tensor:
+            return torch.relu(lacking(*arguments))
+
+        def broken_derivative(*arguments: Tensor) -> Tensor:
+            return (lacking(*arguments) > 0.0)[..., None] * self.lacking_derivative(*arguments)
+
+        term = ElementTerm(
+            SADDLE_SIDES,
+            lacking,
+            [(self.block, self.stencil)],
+            weight=weight,
+            loss=OneSided(),
+            refresh=self,
+            jacobian=self.lacking_derivative,
+            batched=True,
+        )
+        return [term if ahead else replace(term, residual=broken, jacobian=broken_derivative, loss=Squares())]
 
 
 def _beyond(sides: Tensor, spheres: Tensor) -> Tensor:

@@ -24,14 +24,17 @@ from .face_guard import FaceGuard
 from .symmetric_settings import SymmetricSettings
 
 _SAFE_ANGLE = 2.5  # smallest angles at which the barrier sets in
+_KEPT_MARGIN = 0.1  # share of the margin of saddle sides that is kept where conditions are met exactly
 
 
 class Aim(Enum):
     """What a run is for."""
 
-    SHAPE = "conditions, saddle sides and everything else, weighted"
-    TIGHT = "the same with conditions weighted more"
-    EXACT = "conditions alone"
+    SEARCH = "conditions, saddle sides and everything else, weighted; stars may turn into others"
+    SHAPE = "the same, stars stay what they are"
+    TIGHT = "the same as SHAPE with conditions weighted more"
+    EXACT = "conditions and saddle sides alone"
+    CONDITIONS = "conditions alone"
 
 
 class SymmetricProblem:
@@ -95,13 +98,14 @@ class SymmetricProblem:
     def terms(self, aim: Aim) -> list[ElementTerm]:
         """Element terms of an aim."""
         settings = self.settings
-        if aim is Aim.EXACT:
-            return self._conditions(settings.constraint_weight)
-        weight = settings.constraint_weight if aim is Aim.SHAPE else settings.tight_weight
+        if aim in (Aim.EXACT, Aim.CONDITIONS):
+            sides = self.sides.terms(weight=settings.saddle_weight, share=_KEPT_MARGIN) if aim is Aim.EXACT else []
+            return [*self._conditions(settings.constraint_weight), *sides]
+        weight = settings.tight_weight if aim is Aim.TIGHT else settings.constraint_weight
         everywhere = torch.arange(self.topology.num_vertices)
         return [
             *self._conditions(weight),
-            *self.sides.terms(weight=settings.saddle_weight),
+            *self.sides.terms(weight=settings.saddle_weight, ahead=aim is not Aim.SEARCH),
             *c.displacement_fairness_terms(self.base, self.topology, weight=settings.fairness_weight),
             *c.even_star_terms(self.stars, weight=settings.evenness_weight),
             *c.handle_terms(everywhere, self.base, weight=settings.anchor_weight, name="anchors"),

@@ -21,7 +21,7 @@ _EXACT = ProjectionSettings(
     max_iterations=25,
     initial_damping=1e-4,
     damping_scale="identity",
-    merit_tolerance=1e-16,
+    merit_tolerance=1e-2,
     step_tolerance=1e-12,
     least_extrapolation=math.inf,
 )
@@ -29,6 +29,7 @@ _TIGHT_STEPS = 5
 _PORTION_STEPS = 6
 _LONGEST_PULL = 3.0  # mean edge lengths that handles are pulled at once
 _MOST_PORTIONS = 12
+_FAR = 1.5  # mean edge lengths that handles are away, from which on many stars may have to turn into others
 _PULLED = 0.1  # mean edge lengths from which on handles may be to blame where conditions cannot be met
 _MORE_MARGIN = 1.6  # from round to round
 _PATIENT_ROUNDS = 2  # before stars that stay wrong are to be something else
@@ -65,7 +66,7 @@ class SymmetricRounds:
             settled: Whether a state that meets them, with handles at their targets, is all that is asked for.
         """
         if settled and self._farthest() <= self.settings.tolerance and self._is_right(self._score()):
-            return self._run(Aim.EXACT, _EXACT)
+            return self._run(Aim.CONDITIONS, _EXACT)
         start, pulled = self.state, self._farthest() > _PULLED
         best: tuple[tuple[float, int], State] | None = None
         problem = self.problem
@@ -96,17 +97,21 @@ class SymmetricRounds:
     def _round(self, *, first: bool) -> bool:
         """A shape, the same with tighter conditions, and conditions alone; whether it was stopped."""
         shape = self.settings.projection
-        if first and self._approach():
-            return True
+        if first and self._farthest() > _FAR:
+            if self._approach():
+                return True
+            self._decide()
+            if self._run(Aim.SEARCH, shape):
+                return True
         self._decide()
         if self._run(Aim.SHAPE, shape):
             return True
-        if first and self._decide():
-            if self._run(Aim.SHAPE, shape):
-                return True
-            self._decide()
+        if first and self._decide() and self._run(Aim.SHAPE, shape):
+            return True
         tight = replace(shape, max_iterations=_TIGHT_STEPS)
-        return self._run(Aim.TIGHT, tight) or self._run(Aim.EXACT, _EXACT)
+        if self._run(Aim.TIGHT, tight) or self._run(Aim.EXACT, _EXACT):
+            return True
+        return self._score()[0] > self.settings.tolerance and self._run(Aim.CONDITIONS, _EXACT)
 
     def _approach(self) -> bool:
         """Pulls handles most of the way in portions, where they are far from their targets."""
@@ -115,7 +120,7 @@ class SymmetricRounds:
         for portion in range(1, min(portions, _MOST_PORTIONS)):
             self.problem.targets = start.lerp(end, portion / portions)
             self._decide()
-            stopped = self._run(Aim.SHAPE, replace(self.settings.projection, max_iterations=_PORTION_STEPS))
+            stopped = self._run(Aim.SEARCH, replace(self.settings.projection, max_iterations=_PORTION_STEPS))
             self.problem.targets = end
             if stopped:
                 return True

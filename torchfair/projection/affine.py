@@ -67,6 +67,11 @@ class AffinePart:
         result: Tensor = (self._whole @ flat).add_(self.offset)
         return result
 
+    def change(self, step: Tensor) -> Tensor:
+        """(rows,) by how much a step (N,) changes the scaled residuals."""
+        result: Tensor = self._whole @ step
+        return result
+
     def misfit(self, state: State, flat: Tensor) -> str | None:
         """Name of a term whose residuals at a state are not those of the linear map: it is not linear."""
         sizes = abs(self._matrix) @ flat.abs().cpu().numpy() + self.offset.abs().cpu().numpy()

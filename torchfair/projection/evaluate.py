@@ -37,7 +37,7 @@ def residual_table(structure: Structure, terms: Sequence[ElementTerm], at: Evalu
             else:
                 arguments = term.arguments(at.state)
                 values = term.values(arguments)
-            norms.append(torch.linalg.vector_norm(values, dim=1).double().cpu())
+            norms.append(torch.linalg.vector_norm(term.missed(values), dim=1).double().cpu())
             share += float(term.contributions(arguments, values).sum())
         norm = torch.cat(norms)
         mean, largest = (float(norm.mean()), float(norm.max())) if norm.numel() else (0.0, 0.0)

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING
 
 import torch
@@ -14,8 +15,8 @@ from torch import Tensor
 from ..errors import SingularSystemError
 from .damping import Damping
 from .evaluate import check_start, culprit, residual_table
+from .inequalities import Inequalities, Proposal
 from .layout import State
-from .linear import Step
 from .result import IterationRecord, ProjectionResult, Status
 from .settings import ProjectionSettings
 from .system import Evaluation, LinearSystem
@@ -57,6 +58,7 @@ class Iteration:
         self.quantities: dict[str, float] = {}
         self.history: list[IterationRecord] = []
         self.recent: list[float] = []
+        self.heeded: Tensor | None = None
 
     def run(self) -> ProjectionResult:
         """Iterates until a tolerance, a limit, the callback or an interruption ends it."""
@@ -88,6 +90,9 @@ class Iteration:
         while True:
             with self._timed("linearise"):
                 system = self.problem.structure.linearise(self.best)
+                inequalities = Inequalities.of(system)
+                if inequalities is not None:
+                    system = inequalities.heeding(inequalities.broken)
                 scale = self._scale(system)
                 gradient = float((system.gradient.abs() / scale.sqrt()).max())
             if gradient <= self.settings.gradient_tolerance:
@@ -98,31 +103,33 @@ class Iteration:
                     return Status.MAX_ITERATIONS, ""
                 if self.settings.time_limit is not None and self._elapsed() > self.settings.time_limit:
                     return Status.TIME_LIMIT, ""
-                step = self._damped_step(system, scale)
-                if step is None:
+                proposal = self._damped_step(system, inequalities, scale)
+                if proposal is None:
                     return Status.SINGULAR, culprit(self.problem.structure, self.best.state)
                 number += 1
-                accepted, status = self._try(system, scale, step, number, gradient)
+                accepted, status = self._try(proposal, number, gradient)
                 if status is not None:
                     return status, ""
 
-    def _damped_step(self, system: LinearSystem, scale: Tensor) -> Step | None:
+    def _damped_step(self, system: LinearSystem, inequalities: Inequalities | None, scale: Tensor) -> Proposal | None:
         """A solution of the damped system; None where it is singular at every damping."""
         while True:
+            damping = self.damping.value * scale
             try:
                 with self._timed("solve"):
-                    return self.problem.solver.solve(system, self.damping.value * scale, self.accuracy)
+                    solve = partial(self.problem.solver.solve, damping=damping, accuracy=self.accuracy)
+                    if inequalities is None:
+                        return Proposal.of(system, solve(system), damping)
+                    proposal, self.heeded = inequalities.propose(solve, damping, self.heeded)
+                    return proposal
             except SingularSystemError:
                 if not self.damping.reject():
                     return None
 
-    def _try(
-        self, system: LinearSystem, scale: Tensor, step: Step, number: int, gradient: float
-    ) -> tuple[bool, Status | None]:
+    def _try(self, proposal: Proposal, number: int, gradient: float) -> tuple[bool, Status | None]:
         """Takes the step if it lowers the merit; says whether it did, and why to stop."""
         damping, before = self.damping.value, self.best.merit
-        change = step.change * self.problem.structure.free
-        predicted = 0.5 * float(change @ (damping * scale * change - system.gradient + step.remainder))
+        change, predicted = proposal.change, proposal.predicted
         flat = self.problem.layout.flatten(self.best.state)
         trial = self._trial(flat + change)
         fall = -math.inf if trial is None else before - trial.merit
@@ -134,7 +141,7 @@ class Iteration:
             self._extrapolate(flat, change, gain)
             self.damping.accept(gain)
         record = IterationRecord(
-            number, self.best.merit, damping, gain, size, gradient, accepted, step.iterations, self._elapsed()
+            number, self.best.merit, damping, gain, size, gradient, accepted, proposal.iterations, self._elapsed()
         )
         if self._record(record):
             return accepted, Status.CALLBACK

@@ -63,6 +63,23 @@ class SmoothAbsolute:
         return torch.rsqrt(torch.sqrt(residuals.square().sum(1) + self.epsilon**2))
 
 
+@dataclass(frozen=True)
+class OneSided:
+    """``|max(r, 0)|^2 / 2``: every component is an inequality ``r <= 0``.
+
+    The model of a damped step knows about components below zero too, so that a step does not break what it cannot see;
+    see :class:`~torchfair.projection.inequalities.Inequalities`.
+    """
+
+    def value(self, residuals: Tensor) -> Tensor:
+        """Half the squared norm of the components above zero."""
+        return 0.5 * residuals.clamp_min(0.0).square().sum(1)
+
+    def root(self, residuals: Tensor) -> Tensor:
+        """One, for the components that are heeded."""
+        return residuals.new_ones(residuals.shape[0])
+
+
 def apply_root(root: Tensor, values: Tensor) -> Tensor:
     """Roots (n,) or (n, m, m) times residuals ``(n, m)`` or Jacobians ``(n, m, K)``."""
     if root.ndim == 1:

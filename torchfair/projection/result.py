@@ -63,7 +63,7 @@ class IterationRecord:
         step: Largest change of an unknown.
         gradient: Largest scaled component of the gradient.
         accepted: Whether the step was taken.
-        inner_iterations: Iterations of the linear solver.
+        inner_iterations: Iterations of the linear solver; with inequalities, over all systems solved for the step.
         elapsed: Seconds since the start.
         quantities: What ``observe`` returned for the best state, for example energies.
     """

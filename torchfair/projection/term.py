@@ -10,7 +10,7 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from .layout import Layout, State
-from .loss import Loss, Squares, apply_root
+from .loss import Loss, OneSided, Squares, apply_root
 
 Residual = Callable[..., Tensor]
 Refresh = Callable[[State], Sequence[Tensor]]
@@ -37,7 +37,7 @@ class ElementTerm:
         data: Tensors ``(n, ...)`` handed to the residual element by element, constant for derivatives.
         weight: Dimensionless weight of the term, at least 0.
         element_weights: ``(n,)`` optional factors.
-        loss: :class:`Squares`, :class:`SmoothAbsolute`, or another :class:`Loss`.
+        loss: :class:`Squares`, :class:`SmoothAbsolute`, :class:`OneSided` for inequalities, or another :class:`Loss`.
         refresh: Called with every state that is evaluated; returns the ``data`` for that state (closest
             points, frozen directions). The merit is therefore a function of the state alone.
         merit: Element function with the same arguments that replaces the loss in the acceptance test, for
@@ -90,6 +90,8 @@ class ElementTerm:
             raise ShapeError(f"{what}, weight", "a number of at least 0", self.weight)
         if self.linear and (self.refresh is not None or not isinstance(self.loss, Squares) or self.merit is not None):
             raise ShapeError(what, "a linear term with squares and without refresh or merit", "one of these")
+        if self.merit is not None and isinstance(self.loss, OneSided):
+            raise ShapeError(what, "inequalities without a merit of their own", "one")
 
     def arguments(self, state: State) -> tuple[Tensor, ...]:
         """Arguments of :attr:`residual` for all elements at once: ``(n, k, d)`` locals, then the data."""
@@ -108,6 +110,10 @@ class ElementTerm:
     def values(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Residuals ``(n, m)``."""
         return as_rows(self._mapped(self.residual)(*arguments))
+
+    def missed(self, residuals: Tensor) -> Tensor:
+        """Residuals ``(n, m)`` without what holds of inequalities."""
+        return residuals.clamp_min(0.0) if isinstance(self.loss, OneSided) else residuals
 
     def contributions(self, arguments: tuple[Tensor, ...], residuals: Tensor) -> Tensor:
         """(n,) merit of every element."""

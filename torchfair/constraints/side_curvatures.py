@@ -1,0 +1,120 @@
+"""Which way a star of a principal-symmetric mesh is curved: angle excess and curvatures towards w1 and w4.
+
+Stars ``x`` (n, 7, 3) are v, w1, ..., w6; w1 and w4 are the principal neighbours. All functions are of the spokes
+``w_i - v``, so derivatives are given by the spokes, (..., 6, 3).
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from ..geometry._ops import cross, dot, norm
+from ..principal.spheres import spheres_through
+
+_TINY = 1e-24
+_PRINCIPAL, _COSPHERICAL = [0, 3], [1, 2, 4, 5]  # among the spokes
+
+
+def angle_excess(x: Tensor) -> Tensor:
+    """Angle sum minus 2 pi at the first of the vertices ``x`` (n, 7, 3); positive where curvature is negative."""
+    spokes = x[:, 1:] - x[:, :1]
+    after = spokes.roll(-1, 1)
+    angles = torch.atan2(norm(cross(spokes, after)), dot(spokes, after))
+    return angles.sum(1) - 2.0 * math.pi
+
+
+def angle_excess_derivative(x: Tensor) -> Tensor:
+    """Derivative (n, 6, 3) of :func:`angle_excess` by the spokes; zero where two neighbouring spokes are parallel."""
+    spokes = x[:, 1:] - x[:, :1]
+    normals = _unit(cross(spokes, spokes.roll(-1, 1)))
+    return cross(spokes, normals - normals.roll(1, 1)) / dot(spokes, spokes).clamp_min(_TINY)[..., None]
+
+
+def side_curvatures(x: Tensor) -> tuple[Tensor, Tensor]:
+    """``2 n.d / |d|^2`` for the spokes d to w1 and w4 and three unit normals n, (n, 6), and curvatures of spheres (n,).
+
+    The normals are those of the sphere of the star, and of the faces v w2 w3 and v w5 w6. The quotient is the curvature
+    of a circle that touches the plane orthogonal to n in v and passes through the neighbour.
+    """
+    spokes = x[:, 1:] - x[:, :1]
+    principal = spokes[:, _PRINCIPAL]
+    sphere = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]])
+    faces = _unit(cross(spokes[:, [1, 4]], spokes[:, [2, 5]]))
+    normals = torch.cat([sphere.normals[:, None], faces], dim=1)
+    heights = dot(normals[:, :, None], principal[:, None])
+    return (2.0 * heights / dot(principal, principal).clamp_min(_TINY)[:, None]).flatten(1), sphere.curvatures
+
+
+def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
+    """Derivatives (n, 6, 6, 3) and (n, 6, 3) of both results of :func:`side_curvatures` by the spokes."""
+    spokes = x[:, 1:] - x[:, :1]
+    principal = spokes[:, _PRINCIPAL]
+    sphere = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]])
+    a, b = spokes[:, [1, 4]], spokes[:, [2, 5]]
+    products = cross(a, b)
+    faces = _unit(products)
+    squares = dot(principal, principal).clamp_min(_TINY)[..., None]
+    by_normal = 2.0 * principal / squares  # (n, 2, 3), for w1 and w4
+    normals = torch.cat([sphere.normals[:, None], faces], dim=1)
+    sides = dot(normals[:, :, None], by_normal[:, None])  # (n, 3, 2)
+    result = x.new_zeros(x.shape[0], 3, 2, 6, 3)
+    for number, spoke in enumerate(_PRINCIPAL):
+        result[:, :, number, spoke] = (
+            2.0 * normals / squares[:, number, None] - sides[..., number, None] * by_normal[:, number, None]
+        )
+    by_sphere, by_curvature = _sphere_derivatives(spokes[:, _COSPHERICAL], sphere.normals, by_normal)
+    result[:, 0][:, :, _COSPHERICAL] = by_sphere
+    lengths = norm(products).clamp_min(_TINY)[..., None]
+    for face, (first, second) in enumerate(((1, 2), (4, 5))):
+        normal = faces[:, face, None]
+        turned = (by_normal - dot(by_normal, normal)[..., None] * normal) / lengths[:, face, None]
+        result[:, 1 + face, :, first] += cross(b[:, face, None], turned)
+        result[:, 1 + face, :, second] += cross(turned, a[:, face, None])
+    curvature = x.new_zeros(x.shape[0], 6, 3)
+    curvature[:, _COSPHERICAL] = by_curvature
+    return result.flatten(1, 2), curvature
+
+
+def _sphere_derivatives(spokes: Tensor, normals: Tensor, by_normal: Tensor) -> tuple[Tensor, Tensor]:
+    """Derivatives by the spokes (n, 4, 3) to cospherical neighbours, from the formulas of :func:`spheres_through`.
+
+    Returns:
+        (n, k, 4, 3) that of ``g . n`` for every g of ``by_normal`` (n, k, 3), with the normal n of the sphere; and
+        (n, 4, 3) that of its curvature.
+    """
+    a, b, c = (spokes[:, i] + spokes[:, i + 1] for i in range(3))
+    squares = dot(spokes, spokes)
+    p, q, r = (squares[:, i] + squares[:, i + 1] for i in range(3))
+    products = torch.stack([cross(b, c), cross(c, a), cross(a, b)], dim=1)
+    direction = (torch.stack([p, q, r], dim=1)[..., None] * products).sum(1)
+    length = norm(direction).clamp_min(_TINY)[:, None]
+    sign = torch.where(dot(direction, normals) < 0, -1.0, 1.0).to(spokes.dtype)[:, None]
+    curvature = 2.0 * sign * dot(a, products[:, 0])[:, None] / length
+    upright = dot(by_normal, normals[:, None])[..., None]
+    turned = (by_normal - upright * normals[:, None]) * (sign / length)[:, None]
+    turned = torch.cat([turned, (-curvature * direction / length.square())[:, None]], dim=1)  # (n, k + 1, 3)
+    by_squares = dot(turned[:, :, None], products[:, None])[..., None]  # (n, k + 1, 3, 1)
+    by_a = _cross(q, turned, c) - _cross(r, turned, b)
+    by_b = _cross(r, turned, a) - _cross(p, turned, c)
+    by_c = _cross(p, turned, b) - _cross(q, turned, a)
+    by_sums = torch.stack([by_a, by_b, by_c], dim=2)
+    by_sums[:, -1] += 2.0 * (sign / length)[:, None] * products
+    total = _of_both(by_sums) + 2.0 * _of_both(by_squares) * spokes[:, None]
+    return total[:, :-1], total[:, -1]
+
+
+def _cross(factor: Tensor, turned: Tensor, vector: Tensor) -> Tensor:
+    return cross(turned, (factor[:, None] * vector)[:, None].expand_as(turned))
+
+
+def _of_both(by_sums: Tensor) -> Tensor:
+    """Derivatives (n, k, 3, d) by sums of neighbouring spokes, as derivatives (n, k, 4, d) by the spokes."""
+    padded = torch.nn.functional.pad(by_sums, (0, 0, 1, 1))
+    return padded[:, :, :-1] + padded[:, :, 1:]
+
+
+def _unit(vectors: Tensor) -> Tensor:
+    return vectors / norm(vectors).clamp_min(1e-12)[..., None]
