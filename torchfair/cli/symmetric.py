@@ -66,7 +66,7 @@ def add_parser(subparsers: Any) -> None:
     add("--formulation", choices=("spheres", "eliminated", "lifted"), default="spheres", help="unknowns beside the "
         "vertices: spheres of stars, none, or the paper's (default spheres)")  # fmt: skip
     add("--solver", choices=("auto", "dense", "scipy", "rslab", "cg"), default="auto", help="linear solver")
-    add("--steps", type=positive_count, default=200, metavar="N", help="at most this many steps on each level "
+    add("--steps", type=positive_count, default=300, metavar="N", help="at most this many steps on each level "
         "(default 200)")  # fmt: skip
     parser.set_defaults(run=run, name=NAME)
 

@@ -97,7 +97,7 @@ class SymmetricRounds:
     def _round(self, *, first: bool) -> bool:
         """A shape, the same with tighter conditions, and conditions alone; whether it was stopped."""
         shape = self.settings.projection
-        if first and self._farthest() > _FAR:
+        if self._farthest() > _FAR:
             if self._approach():
                 return True
             self._decide()

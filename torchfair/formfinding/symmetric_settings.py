@@ -62,7 +62,7 @@ class SymmetricSettings:
     boundary: str = "free"
     smallest_angle: float = math.radians(10.0)
     tolerance: float = 1e-8
-    most_steps: int = 200
+    most_steps: int = 300
     rounds: int = 6
     formulation: str = "spheres"
     projection: ProjectionSettings = field(default_factory=_default_projection)
