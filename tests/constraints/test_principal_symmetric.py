@@ -21,6 +21,7 @@ from torchfair.constraints.lifted_principal_symmetric import lifted_blocks, lift
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.projection import ElementTerm, GuidedProjection, ProjectionSettings
 from torchfair.projection.layout import State
+from torchfair.projection.term import differentiate
 from torchfair.shapes import Catenoid, Cylinder, Enneper, Paraboloid, ShapeMesh, Torus, principal_triangles
 from torchfair.shapes.principal_triangles import parameter_triangles
 
@@ -175,3 +176,18 @@ def test_displacement_fairness_is_zero_at_translations_and_feels_a_pulled_vertex
     values = torch.cat([term.values(term.arguments({"vertices": pulled})).norm(dim=1) for term in terms])
     assert float(values.max()) == pytest.approx(0.6)
     assert int((values > 1e-12).sum()) == 7  # the vertex, with 0.6, and its neighbours, with 0.1
+
+
+def test_closed_derivatives_of_the_eliminated_conditions() -> None:
+    mesh = principal_triangles(Torus(2.0, 1.0), 12, 16, along="u")
+    generator = torch.Generator().manual_seed(3)
+    vertices = mesh.vertices + 0.03 * torch.randn(mesh.vertices.shape, dtype=DOUBLE, generator=generator)
+    edges = principal_edges_of_lattice(mesh, "u")
+    stars = edges.stars()
+    between = ps.between_stars(edges.topology.edges[edges.mask], stars)
+    for term in eliminated_principal_symmetric_terms(between, stars, weight=1.0):
+        arguments = term.arguments({"vertices": vertices})
+        _, expected = differentiate(term.residual, arguments, 1, batched=True)
+        assert float((term.jacobians(arguments) - expected).abs().max()) < 1e-11 * float(expected.abs().max())
+        collapsed = term.arguments({"vertices": vertices * torch.tensor([1.0, 0.0, 0.0], dtype=DOUBLE)})
+        assert float(term.jacobians(collapsed).abs().max()) == 0.0  # no sphere is determined

@@ -247,6 +247,25 @@ def test_an_edit_from_a_warm_state_is_the_same_design() -> None:
             design.move({vertex: place})
 
 
+def test_one_round_meets_conditions_and_saddle_sides_together() -> None:
+    """Steps heed saddle sides while conditions are met; blind ones leave some stars beside the boundary wrong."""
+    mesh = principal_triangles(Catenoid(1.0, (-1.0, 1.0)), 16, 30, along="v", ends="zigzag")
+    edges = principal_edges_of_lattice(mesh, "v")
+    vertices, stars = mesh.vertices, edges.stars().vertices
+    handle = int(stars[len(stars) // 2])
+    far = int((vertices - vertices[handle]).norm(dim=1).argmax())
+    pull = 0.25 * float((vertices.amax(0) - vertices.amin(0)).norm())
+    place = vertices[handle] + pull * vertex_normals(vertices, edges.topology)[handle]
+    design = SymmetricDesign(vertices, edges, handles=[handle, far])
+    handles = {handle: place.tolist(), far: vertices[far].tolist()}
+    design.move(handles, rounds=1)
+    measures = design.measures()
+    assert max(measures["largest_cospherical"], measures["largest_coplanar"]) < 1e-9
+    assert measures["saddle_side_share"] == 1.0
+    assert measures["crossing_pyramids_negative"] == 0.0
+    assert measures["largest_handle_distance"] < 0.05 * measures["mean_edge_length"]
+
+
 def test_singular_vertices_are_left_out() -> None:
     from principal_lattices import cone
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from ..geometry._ops import cross, dot
 from ..principal.principal_edges import PrincipalStars
+from ..principal.sphere_derivatives import sphere_derivatives
 from ..principal.spheres import spheres_through
 from ..projection import ElementTerm
 from .principal_symmetric import COPLANAR, COSPHERICAL, coplanar, star_numbers
@@ -16,11 +18,42 @@ def eliminated_cospherical(x: Tensor) -> Tensor:
     return spheres_through(x[:, 0], x[:, 1:]).misses
 
 
+def eliminated_cospherical_derivative(x: Tensor) -> Tensor:
+    """Jacobians (n, 15) of :func:`eliminated_cospherical`."""
+    spokes = x[:, 1:] - x[:, :1]
+    sphere = spheres_through(x[:, 0], x[:, 1:])
+    first = spokes[:, :1]
+    by_normal, by_curvature = sphere_derivatives(spokes, sphere.normals, -2.0 * first)
+    by_spokes = by_normal[:, 0] + by_curvature * dot(first, first)[..., None]
+    by_spokes[:, 0] += 2.0 * (sphere.curvatures[:, None] * first[:, 0] - sphere.normals)
+    return _by_vertices(by_spokes)
+
+
 def eliminated_coplanar(x: Tensor) -> Tensor:
     """:func:`~torchfair.constraints.principal_symmetric.coplanar` at two vertices with four neighbours each."""
     first, second = x[:, :5], x[:, 5:]
     normals = [spheres_through(star[:, 0], star[:, 1:]).normals for star in (first, second)]
     return coplanar(x[:, [0, 5]], torch.stack(normals, dim=1))
+
+
+def eliminated_coplanar_derivative(x: Tensor) -> Tensor:
+    """Jacobians (n, 30) of :func:`eliminated_coplanar`."""
+    edge = x[:, 5] - x[:, 0]
+    stars = [x[:, :5], x[:, 5:]]
+    first, second = (spheres_through(star[:, 0], star[:, 1:]).normals for star in stars)
+    parts = []
+    for star, normal, by_normal in zip(stars, (first, second), (cross(second, edge), cross(edge, first)), strict=True):
+        by_spokes = sphere_derivatives(star[:, 1:] - star[:, :1], normal, by_normal[:, None])[0]
+        parts.append(_by_vertices(by_spokes[:, 0]))
+    by_edge = cross(first, second)
+    parts[0][:, :3] -= by_edge
+    parts[1][:, :3] += by_edge
+    return torch.cat(parts, dim=1)
+
+
+def _by_vertices(by_spokes: Tensor) -> Tensor:
+    """Derivatives (n, 4, 3) by the spokes as derivatives (n, 15) by vertex and neighbours."""
+    return torch.cat([-by_spokes.sum(1, keepdim=True), by_spokes], dim=1).flatten(1)
 
 
 def eliminated_principal_symmetric_terms(
@@ -44,6 +77,20 @@ def eliminated_principal_symmetric_terms(
     numbers = star_numbers(edges, stars)
     both = torch.cat([reach[numbers[:, 0]], reach[numbers[:, 1]]], dim=1)
     return [
-        ElementTerm(COSPHERICAL, eliminated_cospherical, [(block, reach)], weight=weight, batched=True),
-        ElementTerm(COPLANAR, eliminated_coplanar, [(block, both)], weight=weight, batched=True),
+        ElementTerm(
+            COSPHERICAL,
+            eliminated_cospherical,
+            [(block, reach)],
+            weight=4.0 * weight,  # four neighbours miss the sphere alike
+            jacobian=eliminated_cospherical_derivative,
+            batched=True,
+        ),
+        ElementTerm(
+            COPLANAR,
+            eliminated_coplanar,
+            [(block, both)],
+            weight=weight,
+            jacobian=eliminated_coplanar_derivative,
+            batched=True,
+        ),
     ]

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from ..geometry._ops import cross, dot, norm
+from ..principal.sphere_derivatives import sphere_derivatives
 from ..principal.spheres import spheres_through
 
 _TINY = 1e-24
@@ -65,7 +66,7 @@ def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
         result[:, :, number, spoke] = (
             2.0 * normals / squares[:, number, None] - sides[..., number, None] * by_normal[:, number, None]
         )
-    by_sphere, by_curvature = _sphere_derivatives(spokes[:, _COSPHERICAL], sphere.normals, by_normal)
+    by_sphere, by_curvature = sphere_derivatives(spokes[:, _COSPHERICAL], sphere.normals, by_normal)
     result[:, 0][:, :, _COSPHERICAL] = by_sphere
     lengths = norm(products).clamp_min(_TINY)[..., None]
     for face, (first, second) in enumerate(((1, 2), (4, 5))):
@@ -76,44 +77,6 @@ def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
     curvature = x.new_zeros(x.shape[0], 6, 3)
     curvature[:, _COSPHERICAL] = by_curvature
     return result.flatten(1, 2), curvature
-
-
-def _sphere_derivatives(spokes: Tensor, normals: Tensor, by_normal: Tensor) -> tuple[Tensor, Tensor]:
-    """Derivatives by the spokes (n, 4, 3) to cospherical neighbours, from the formulas of :func:`spheres_through`.
-
-    Returns:
-        (n, k, 4, 3) that of ``g . n`` for every g of ``by_normal`` (n, k, 3), with the normal n of the sphere; and
-        (n, 4, 3) that of its curvature.
-    """
-    a, b, c = (spokes[:, i] + spokes[:, i + 1] for i in range(3))
-    squares = dot(spokes, spokes)
-    p, q, r = (squares[:, i] + squares[:, i + 1] for i in range(3))
-    products = torch.stack([cross(b, c), cross(c, a), cross(a, b)], dim=1)
-    direction = (torch.stack([p, q, r], dim=1)[..., None] * products).sum(1)
-    length = norm(direction).clamp_min(_TINY)[:, None]
-    sign = torch.where(dot(direction, normals) < 0, -1.0, 1.0).to(spokes.dtype)[:, None]
-    curvature = 2.0 * sign * dot(a, products[:, 0])[:, None] / length
-    upright = dot(by_normal, normals[:, None])[..., None]
-    turned = (by_normal - upright * normals[:, None]) * (sign / length)[:, None]
-    turned = torch.cat([turned, (-curvature * direction / length.square())[:, None]], dim=1)  # (n, k + 1, 3)
-    by_squares = dot(turned[:, :, None], products[:, None])[..., None]  # (n, k + 1, 3, 1)
-    by_a = _cross(q, turned, c) - _cross(r, turned, b)
-    by_b = _cross(r, turned, a) - _cross(p, turned, c)
-    by_c = _cross(p, turned, b) - _cross(q, turned, a)
-    by_sums = torch.stack([by_a, by_b, by_c], dim=2)
-    by_sums[:, -1] += 2.0 * (sign / length)[:, None] * products
-    total = _of_both(by_sums) + 2.0 * _of_both(by_squares) * spokes[:, None]
-    return total[:, :-1], total[:, -1]
-
-
-def _cross(factor: Tensor, turned: Tensor, vector: Tensor) -> Tensor:
-    return cross(turned, (factor[:, None] * vector)[:, None].expand_as(turned))
-
-
-def _of_both(by_sums: Tensor) -> Tensor:
-    """Derivatives (n, k, 3, d) by sums of neighbouring spokes, as derivatives (n, k, 4, d) by the spokes."""
-    padded = torch.nn.functional.pad(by_sums, (0, 0, 1, 1))
-    return padded[:, :, :-1] + padded[:, :, 1:]
 
 
 def _unit(vectors: Tensor) -> Tensor:
