@@ -1,4 +1,4 @@
-"""How a principal-symmetric mesh is found: a shape first, then the conditions to rounding; again where that fails."""
+"""How a principal-symmetric mesh is found: a shape, then conditions and saddle sides to rounding; again if it fails."""
 
 from __future__ import annotations
 
@@ -95,7 +95,10 @@ class SymmetricRounds:
     # ---- one round ---------------------------------------------------------------------------------------
 
     def _round(self, *, first: bool) -> bool:
-        """A shape, the same with tighter conditions, and conditions alone; whether it was stopped."""
+        """A shape, the same with tighter conditions, conditions and saddle sides alone; whether it was stopped.
+
+        Where both cannot be met together, conditions are met alone.
+        """
         shape = self.settings.projection
         if self._farthest() > _FAR:
             if self._approach():
