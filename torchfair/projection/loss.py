@@ -67,8 +67,8 @@ class SmoothAbsolute:
 class OneSided:
     """``|max(r, 0)|^2 / 2``: every component is an inequality ``r <= 0``.
 
-    The model of a damped step knows about components below zero too, so that a step does not break what it cannot see;
-    see :class:`~torchfair.projection.inequalities.Inequalities`.
+    The model of a damped step knows about components below zero too, so that a step does not break what holds where it
+    starts: see "How the solver decides" in the documentation.
     """
 
     def value(self, residuals: Tensor) -> Tensor:
