@@ -67,7 +67,7 @@ def add_parser(subparsers: Any) -> None:
         "vertices: spheres of stars, none, or the paper's (default spheres)")  # fmt: skip
     add("--solver", choices=("auto", "dense", "scipy", "rslab", "cg"), default="auto", help="linear solver")
     add("--steps", type=positive_count, default=300, metavar="N", help="at most this many steps on each level "
-        "(default 200)")  # fmt: skip
+        "(default 300)")  # fmt: skip
     parser.set_defaults(run=run, name=NAME)
 
 

@@ -11,6 +11,7 @@ from ..principal.sphere_derivatives import sphere_derivatives
 from ..principal.spheres import spheres_through
 from ..projection import ElementTerm
 from .principal_symmetric import COPLANAR, COSPHERICAL, coplanar, star_numbers
+from .star_stencils import by_vertices
 
 
 def eliminated_cospherical(x: Tensor) -> Tensor:
@@ -26,7 +27,7 @@ def eliminated_cospherical_derivative(x: Tensor) -> Tensor:
     by_normal, by_curvature = sphere_derivatives(spokes, sphere.normals, -2.0 * first)
     by_spokes = by_normal[:, 0] + by_curvature * dot(first, first)[..., None]
     by_spokes[:, 0] += 2.0 * (sphere.curvatures[:, None] * first[:, 0] - sphere.normals)
-    return _by_vertices(by_spokes)
+    return by_vertices(by_spokes)
 
 
 def eliminated_coplanar(x: Tensor) -> Tensor:
@@ -44,16 +45,11 @@ def eliminated_coplanar_derivative(x: Tensor) -> Tensor:
     parts = []
     for star, normal, by_normal in zip(stars, (first, second), (cross(second, edge), cross(edge, first)), strict=True):
         by_spokes = sphere_derivatives(star[:, 1:] - star[:, :1], normal, by_normal[:, None])[0]
-        parts.append(_by_vertices(by_spokes[:, 0]))
+        parts.append(by_vertices(by_spokes[:, 0]))
     by_edge = cross(first, second)
     parts[0][:, :3] -= by_edge
     parts[1][:, :3] += by_edge
     return torch.cat(parts, dim=1)
-
-
-def _by_vertices(by_spokes: Tensor) -> Tensor:
-    """Derivatives (n, 4, 3) by the spokes as derivatives (n, 15) by vertex and neighbours."""
-    return torch.cat([-by_spokes.sum(1, keepdim=True), by_spokes], dim=1).flatten(1)
 
 
 def eliminated_principal_symmetric_terms(

@@ -30,6 +30,7 @@ from ..projection import ElementTerm, OneSided, Squares
 from ..projection.layout import State
 from .principal_symmetric import star_stencil
 from .side_curvatures import angle_excess, angle_excess_derivative, side_curvatures, side_curvatures_derivative
+from .star_stencils import by_vertices
 
 SADDLE_SIDES = "saddle sides"
 _NEGATIVE = 1e-9  # radians by which the angle sum is above 2 pi where curvature counts as negative
@@ -140,8 +141,7 @@ class SaddleSides:
         sides, spheres = side_curvatures_derivative(x)
         saddle = torch.cat([sides, -spheres[:, None]], dim=1) * (is_saddle * per_curvature)[:, None, None, None]
         other = ((1.0 - is_saddle) * per_excess)[:, None, None] * angle_excess_derivative(x)
-        by_spokes = torch.cat([saddle, other[:, None]], dim=1)
-        return torch.cat([-by_spokes.sum(2, keepdim=True), by_spokes], dim=2).flatten(2)
+        return by_vertices(torch.cat([saddle, other[:, None]], dim=1))
 
     def terms(self, *, weight: float, share: float = 1.0, ahead: bool = True) -> list[ElementTerm]:
         """Inequalities of every star.

@@ -11,7 +11,7 @@ import math
 import torch
 from torch import Tensor
 
-from ..geometry._ops import cross, dot, norm
+from ..geometry._ops import cross, dot, norm, unit
 from ..principal.sphere_derivatives import sphere_derivatives
 from ..principal.spheres import spheres_through
 
@@ -30,7 +30,7 @@ def angle_excess(x: Tensor) -> Tensor:
 def angle_excess_derivative(x: Tensor) -> Tensor:
     """Derivative (n, 6, 3) of :func:`angle_excess` by the spokes; zero where two neighbouring spokes are parallel."""
     spokes = x[:, 1:] - x[:, :1]
-    normals = _unit(cross(spokes, spokes.roll(-1, 1)))
+    normals = unit(cross(spokes, spokes.roll(-1, 1)))
     return cross(spokes, normals - normals.roll(1, 1)) / dot(spokes, spokes).clamp_min(_TINY)[..., None]
 
 
@@ -43,7 +43,7 @@ def side_curvatures(x: Tensor) -> tuple[Tensor, Tensor]:
     spokes = x[:, 1:] - x[:, :1]
     principal = spokes[:, _PRINCIPAL]
     sphere = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]])
-    faces = _unit(cross(spokes[:, [1, 4]], spokes[:, [2, 5]]))
+    faces = unit(cross(spokes[:, [1, 4]], spokes[:, [2, 5]]))
     normals = torch.cat([sphere.normals[:, None], faces], dim=1)
     heights = dot(normals[:, :, None], principal[:, None])
     return (2.0 * heights / dot(principal, principal).clamp_min(_TINY)[:, None]).flatten(1), sphere.curvatures
@@ -56,7 +56,7 @@ def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
     sphere = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]])
     a, b = spokes[:, [1, 4]], spokes[:, [2, 5]]
     products = cross(a, b)
-    faces = _unit(products)
+    faces = unit(products)
     squares = dot(principal, principal).clamp_min(_TINY)[..., None]
     by_normal = 2.0 * principal / squares  # (n, 2, 3), for w1 and w4
     normals = torch.cat([sphere.normals[:, None], faces], dim=1)
@@ -68,16 +68,13 @@ def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
         )
     by_sphere, by_curvature = sphere_derivatives(spokes[:, _COSPHERICAL], sphere.normals, by_normal)
     result[:, 0][:, :, _COSPHERICAL] = by_sphere
-    lengths = norm(products).clamp_min(_TINY)[..., None]
+    lengths = norm(products)[..., None]
+    inverse = torch.where(lengths > 0, 1.0 / torch.where(lengths > 0, lengths, 1.0), 0.0)
     for face, (first, second) in enumerate(((1, 2), (4, 5))):
         normal = faces[:, face, None]
-        turned = (by_normal - dot(by_normal, normal)[..., None] * normal) / lengths[:, face, None]
+        turned = (by_normal - dot(by_normal, normal)[..., None] * normal) * inverse[:, face, None]
         result[:, 1 + face, :, first] += cross(b[:, face, None], turned)
         result[:, 1 + face, :, second] += cross(turned, a[:, face, None])
     curvature = x.new_zeros(x.shape[0], 6, 3)
     curvature[:, _COSPHERICAL] = by_curvature
     return result.flatten(1, 2), curvature
-
-
-def _unit(vectors: Tensor) -> Tensor:
-    return vectors / norm(vectors).clamp_min(1e-12)[..., None]

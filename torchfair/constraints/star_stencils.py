@@ -13,6 +13,11 @@ def closed_star_stencils(topology: Topology) -> list[Tensor]:
     return [torch.cat([centres[:, None], ring], dim=1) for centres, ring in topology.rings_by_valence.values()]
 
 
+def by_vertices(by_spokes: Tensor) -> Tensor:
+    """Derivatives (..., k, 3) by the spokes of stars as derivatives (..., 3 + 3k) by vertex and ring."""
+    return torch.cat([-by_spokes.sum(-2, keepdim=True), by_spokes], dim=-2).flatten(-2)
+
+
 def open_star_stencils(topology: Topology, vertices: Tensor) -> list[tuple[Tensor, Tensor]]:
     """Stars of boundary ``vertices`` (N,), whose rings run from one boundary edge to the other.
 

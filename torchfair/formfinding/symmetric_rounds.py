@@ -114,7 +114,7 @@ class SymmetricRounds:
         tight = replace(shape, max_iterations=_TIGHT_STEPS)
         if self._run(Aim.TIGHT, tight) or self._run(Aim.EXACT, _EXACT):
             return True
-        return self._score()[0] > self.settings.tolerance and self._run(Aim.CONDITIONS, _EXACT)
+        return self._largest_residual() > self.settings.tolerance and self._run(Aim.CONDITIONS, _EXACT)
 
     def _approach(self) -> bool:
         """Pulls handles most of the way in portions, where they are far from their targets."""
@@ -158,10 +158,11 @@ class SymmetricRounds:
 
     def _score(self) -> tuple[float, int]:
         """Largest relative residual, not below the tolerance, and how many saddle sides are wrong."""
-        vertices = self.state["vertices"]
-        residuals = condition_residuals(vertices, self.principal, self.problem.stars)
-        largest = max(float(values.max()) for values in residuals.values() if values.numel())
-        return max(largest, self.settings.tolerance), self._count_wrong(vertices)
+        return max(self._largest_residual(), self.settings.tolerance), self._count_wrong(self.state["vertices"])
+
+    def _largest_residual(self) -> float:
+        residuals = condition_residuals(self.state["vertices"], self.principal, self.problem.stars)
+        return max(float(values.max()) for values in residuals.values() if values.numel())
 
     def _is_right(self, score: tuple[float, int]) -> bool:
         return score == (self.settings.tolerance, 0)

@@ -56,6 +56,12 @@ def norm(x: Tensor) -> Tensor:
     return torch.where(positive, torch.where(positive, squared, 1.0).sqrt(), 0.0)
 
 
+def unit(x: Tensor) -> Tensor:
+    """Vectors along the last dimension divided by their length; zero with zero derivatives where that is zero."""
+    lengths = norm(x)
+    return x / torch.where(lengths > 0, lengths, 1.0)[..., None]
+
+
 def map_faces(vertices: Tensor, topology: Topology, function: Callable[[Tensor], Tensor]) -> Tensor:
     """Applies ``function`` to the corner positions of all faces, those with equally many corners at once.
 

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from ..topology import Topology
-from ._ops import cross, norm, scatter_sum
+from ._ops import cross, scatter_sum, unit
 from .dihedral import dihedral_angles
 from .lengths import edge_vectors
 from .normals import adjacent_normals
@@ -52,14 +52,8 @@ def shape_operators(vertices: Tensor, topology: Topology, *, sine: bool = True) 
         left, right, _ = adjacent_normals(vertices, topology)
         axis = cross(left, right)  # zero beside degenerate faces, whose normal is zero
     else:
-        axis = _unit(edges) * dihedral_angles(vertices, topology)[..., None]
+        axis = unit(edges) * dihedral_angles(vertices, topology)[..., None]
     per_edge = (axis[..., :, None] * edges[..., None, :]).flatten(-2) / 2
     v, w = topology.interior_edges.unbind(1)
     stars = scatter_sum(torch.cat([per_edge, per_edge], dim=-2), torch.cat([v, w]), topology.num_vertices)
     return stars.reshape((*vertices.shape[:-1], 3, 3))
-
-
-def _unit(edges: Tensor) -> Tensor:
-    """Edges divided by their length, zero with zero derivatives where the length is zero."""
-    lengths = norm(edges)
-    return edges / torch.where(lengths > 0, lengths, 1.0)[..., None]

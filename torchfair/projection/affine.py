@@ -64,8 +64,7 @@ class AffinePart:
 
     def residual(self, flat: Tensor) -> Tensor:
         """(rows,) scaled residuals; half the sum of their squares is the merit of the linear terms."""
-        result: Tensor = (self._whole @ flat).add_(self.offset)
-        return result
+        return self.change(flat).add_(self.offset)
 
     def change(self, step: Tensor) -> Tensor:
         """(rows,) by how much a step (N,) changes the scaled residuals."""
