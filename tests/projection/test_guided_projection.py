@@ -9,6 +9,7 @@ from torch import Tensor
 
 from torchfair import ShapeError, Topology, TorchfairError
 from torchfair.errors import SingularSystemError
+from torchfair.linear import Factor, ScipyDirect, System
 from torchfair.projection import (
     ElementTerm,
     GuidedProjection,
@@ -18,7 +19,6 @@ from torchfair.projection import (
     Status,
     guided_projection,
 )
-from torchfair.projection.linear import ScipyDirect
 
 
 def stretched(x: Tensor, length: Tensor) -> Tensor:
@@ -210,10 +210,10 @@ class Reluctant(ScipyDirect):
     def __init__(self, needed: float) -> None:
         self.needed = needed
 
-    def solve(self, system: object, damping: Tensor, accuracy: float) -> object:
+    def factorise(self, system: System, damping: Tensor) -> Factor:
         if float(damping.max()) < self.needed:
             raise SingularSystemError("singular")
-        return super().solve(system, damping, accuracy)
+        return super().factorise(system, damping)
 
 
 def test_singular_system_raises_damping() -> None:
@@ -261,8 +261,8 @@ def test_batch_equals_loop_and_shares_the_analysis() -> None:
     batch = torch.stack([vertices, vertices + 0.1 * torch.sin(vertices), 1.2 * vertices])
     problem = GuidedProjection({"vertices": vertices}, [length_term(topology)], solver="scipy")
     calls = []
-    original = problem.solver.prepare
-    problem.solver.prepare = lambda structure: (calls.append(1), original(structure))
+    original = problem.solver.analyse
+    problem.solver.analyse = lambda lower: (calls.append(1), original(lower))
     together = problem.solve_batch({"vertices": batch})
     assert len(calls) == 1
     for member, result in zip(batch, together, strict=True):

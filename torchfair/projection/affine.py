@@ -10,9 +10,9 @@ import scipy.sparse as sp
 import torch
 from torch import Tensor
 
+from ..linear.sparse import csr_matrix
 from .compiled import CompiledTerm
 from .layout import Layout, State
-from .sparse import csr_matrix
 
 _TOLERANCE = 1e-3
 

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor
 
+from .._threads import threads_for
 from ..errors import ShapeError
-from .iteration import Callback, Guard, Iteration, Observe
-from .layout import Layout, State
-from .linear import LinearSolver, choose_solver
-from .linear.direct import SparseDirect
+from .layout import State
+from .problem import Problem
 from .result import ProjectionResult
+from .run import Callback, Observe, Run
 from .settings import ProjectionSettings
-from .system import Structure
+from .steps import Guard
 from .term import ElementTerm
-from .threads import threads_for
 
 
 def guided_projection(
@@ -41,7 +39,8 @@ def guided_projection(
         terms: What is to be small. See :class:`ElementTerm`.
         fixed: Masks ``(n,)`` or ``(n, d)`` by block name, True where an unknown stays as it is.
         settings: Tolerances, damping, linear solver.
-        callback: Called with every :class:`IterationRecord`; returning True stops the iteration.
+        callback: Called with every :class:`IterationRecord`, which then also holds the state; returning True stops
+            the iteration.
         observe: Named quantities of a state to keep in the history.
         guard: ``guard(state, trial)`` refuses a trial state by returning False; the step then counts as
             one that does not lower the merit.
@@ -58,7 +57,7 @@ def guided_projection(
     return problem.solve(blocks, settings=settings, callback=callback, observe=observe, guard=guard)
 
 
-class GuidedProjection:
+class GuidedProjection(Problem):
     """Terms compiled for blocks of given sizes; solves from many starts with one symbolic analysis.
 
     Args:
@@ -66,46 +65,6 @@ class GuidedProjection:
         terms, fixed: See :func:`guided_projection`.
         solver: Name of a linear solver, or an object with that protocol.
     """
-
-    def __init__(
-        self,
-        blocks: State,
-        terms: Sequence[ElementTerm],
-        *,
-        fixed: Mapping[str, Tensor] | None = None,
-        solver: str | LinearSolver = "auto",
-    ) -> None:
-        if not blocks or not terms:
-            raise ShapeError("guided projection", "at least one block and one term", f"{len(blocks)} and {len(terms)}")
-        first = next(iter(blocks.values()))
-        for name, block in blocks.items():
-            if block.dtype != first.dtype or block.device != first.device:
-                raise ShapeError(
-                    f"block '{name}'", f"{first.dtype} on {first.device}", f"{block.dtype} on {block.device}"
-                )
-        self.terms = list(terms)
-        self.layout = Layout.of(blocks)
-        free = self.layout.free_mask(fixed or {}, first.device)
-        self.structure = Structure(self.layout, self.terms, free, first.dtype)
-        self.solver = choose_solver(solver, self.structure) if isinstance(solver, str) else solver
-        self._prepared = False
-
-    def with_terms(self, terms: Sequence[ElementTerm]) -> GuidedProjection:
-        """The same problem with other data, weights and losses of its terms; index maps and analysis are kept.
-
-        Args:
-            terms: On the same stencils as those before, in the same order.
-
-        Raises:
-            ShapeError: stencils differ, or other terms have elements and a weight.
-        """
-        result = copy.copy(self)
-        result.terms = list(terms)
-        result.structure = self.structure.with_terms(terms)
-        kept = isinstance(self.solver, SparseDirect) and result.structure.shares_pattern(self.structure)
-        result._prepared = self._prepared and kept
-        result.solver = self.solver if kept else copy.copy(self.solver)
-        return result
 
     def solve(
         self,
@@ -117,11 +76,9 @@ class GuidedProjection:
         guard: Guard | None = None,
     ) -> ProjectionResult:
         """Iterates from ``blocks``; see :func:`guided_projection`. The linear solver is that of the constructor."""
-        if Layout.of(blocks) != self.layout:
-            raise ShapeError("blocks", str(self.layout.sizes), str(Layout.of(blocks).sizes))
-        with torch.no_grad(), threads_for(self.layout.num_unknowns, self.structure.free.device):
-            run = Iteration(self, blocks, settings or ProjectionSettings(), callback, observe, guard)
-            return run.run()
+        settings = settings or ProjectionSettings()
+        with torch.no_grad(), threads_for(self.layout.num_unknowns, self.structure.device):
+            return Run(self, blocks, settings, callback, observe, guard).result()
 
     def solve_batch(self, blocks: State, *, settings: ProjectionSettings | None = None) -> list[ProjectionResult]:
         """Iterates from every member of blocks ``(batch, n, d)``, one result each."""
@@ -131,9 +88,3 @@ class GuidedProjection:
             raise ShapeError("blocks", "(batch, n, d) with one batch size", shapes)
         members = [{name: block[i] for name, block in blocks.items()} for i in range(counts.pop())]
         return [self.solve(member, settings=settings) for member in members]
-
-    def prepare(self) -> None:
-        """Symbolic analysis, once."""
-        if not self._prepared:
-            self.solver.prepare(self.structure)
-            self._prepared = True

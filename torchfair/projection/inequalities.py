@@ -2,43 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from .linear.base import Step
-from .loss import OneSided
+from ..linear import LinearSolver
+from .loss import is_one_sided
+from .proposal import Proposal
 from .system import LinearSystem
-
-Solve = Callable[[LinearSystem], Step]
 
 _MOST_SOLVES = 6
 _ENOUGH = 0.1  # of the fall of the model: cost of inequalities wrongly heeded or ignored that is worth a solve
 _WHOLE = 0.9  # of a change that is all but gone to its end
 _HALVINGS = 40
-
-
-class Proposal(NamedTuple):
-    """A step to be tried.
-
-    Attributes:
-        change: (N,) zero at fixed unknowns.
-        predicted: By how much the merit of the linearised residuals falls.
-        iterations: Of the linear solver, over all systems solved.
-    """
-
-    change: Tensor
-    predicted: float
-    iterations: int
-
-    @classmethod
-    def of(cls, system: LinearSystem, step: Step, damping: Tensor) -> Proposal:
-        """From the solution of one damped system."""
-        change = step.change * system.structure.free
-        predicted = 0.5 * float(change @ (damping * change - system.gradient + step.remainder))
-        return cls(change, predicted, step.iterations)
 
 
 class Inequalities:
@@ -65,7 +42,7 @@ class Inequalities:
     def of(cls, whole: LinearSystem) -> Inequalities | None:
         """None if no term is one-sided."""
         terms = [compiled.term for compiled in whole.structure.compiled]
-        numbers = [number for number, term in enumerate(terms) if isinstance(term.loss, OneSided)]
+        numbers = [number for number, term in enumerate(terms) if is_one_sided(term.loss)]
         return cls(whole, numbers) if numbers else None
 
     def heeding(self, heeded: Tensor) -> LinearSystem:
@@ -79,7 +56,7 @@ class Inequalities:
             jacobians[number] = jacobians[number] * chosen[:, None]
         return LinearSystem(self._whole.structure, jacobians, residuals, self._whole.affine_residual)
 
-    def propose(self, solve: Solve, damping: Tensor, likely: Tensor | None) -> tuple[Proposal, Tensor]:
+    def propose(self, solver: LinearSolver, damping: Tensor, likely: Tensor | None, accuracy: float) -> Proposal:
         """The step that minimises the merit of linearised residuals, plus damping.
 
         That is a convex, piecewise quadratic function. Newton's method for it asks after every linear solve which
@@ -87,27 +64,27 @@ class Inequalities:
         minimum, or near it.
 
         Args:
-            solve: Solves a system with damping.
+            solver: Linear solver, prepared for the systems of this structure.
             damping: (N,) diagonal.
             likely: (n,) inequalities that are likely to be heeded, such as those of the step before.
-
-        Returns:
-            The step, and (n,) bool the inequalities that it heeds.
+            accuracy: Relative remainder of linear solutions that is good enough.
         """
         free = self._whole.structure.free
         start = at = _Point(torch.zeros_like(damping), self._equations, self._inequalities, damping)
         heeded = self.broken if likely is None else self.broken | likely
         iterations = 0
         for _ in range(_MOST_SOLVES):
-            step = solve(self.heeding(heeded))
-            iterations += step.iterations
-            at, whole = at.lowest_along(*self._along(step.change * free - at.change))
+            system = self.heeding(heeded)
+            factor = solver.factorise(system, damping)
+            solution = factor.solve(-system.gradient, accuracy)
+            iterations += solution.iterations
+            at, whole = at.lowest_along(*self._along(solution.values * free - at.change))
             broken = at.inequalities > 0.0
             missed = torch.where(broken != heeded, at.inequalities, 0.0)
             heeded = broken
             if whole and 0.5 * float(missed @ missed) <= _ENOUGH * (start.damped - at.damped):
                 break
-        return Proposal(at.change, start.merit - at.merit, iterations), heeded
+        return Proposal(at.change, start.merit - at.merit, iterations, system, factor, damping, heeded)
 
     def _along(self, change: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """A step (N,) and the changes of equations and inequalities that come with it, by the linear model."""

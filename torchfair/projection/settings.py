@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .linear.base import LinearSolver
+from ..linear import LinearSolver
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,9 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError
+from ..linear import LowerTriangle
+from ..linear.block_inverse import block_inverse
+from ..linear.sparse import scatter_matrix
 from .affine import AffinePart
 from .block_diagonal import BlockDiagonal
 from .compiled import CompiledTerm
@@ -18,7 +21,6 @@ from .layout import Layout, State
 from .loss import apply_root
 from .normal_pattern import NormalPattern
 from .row_pattern import RowPattern
-from .sparse import scatter_matrix
 from .term import ElementTerm
 
 
@@ -88,12 +90,22 @@ class Structure:
     def shares_pattern(self, other: Structure) -> bool:
         """Whether the normal matrices of both are filled in the same places; False unless known."""
         mine, theirs = (structure.__dict__.get("normal_pattern") for structure in (self, other))
-        return mine is not None and theirs is not None and mine.rows is theirs.rows
+        return mine is not None and theirs is not None and mine.lower is theirs.lower
 
     @property
     def num_unknowns(self) -> int:
         """Length of the flat vector."""
         return self.free.shape[0]
+
+    @property
+    def device(self) -> torch.device:
+        """Of the unknowns."""
+        return self.free.device
+
+    @property
+    def lower(self) -> LowerTriangle:
+        """Places of the lower triangle of the normal matrix."""
+        return self.normal_pattern.lower
 
     @cached_property
     def _scatter(self) -> Tensor:
@@ -214,8 +226,31 @@ class LinearSystem:
         parts = [r.reshape(-1) for r in self.residuals]
         return torch.cat(parts if self.affine_residual is None else [*parts, self.affine_residual])
 
+    @property
+    def pattern(self) -> Structure:
+        """Where the normal matrix has entries."""
+        return self.structure
+
+    @property
+    def root(self) -> Tensor:
+        """``J``, the root of the normal matrix."""
+        return self.jacobian
+
+    def product(self, vectors: Tensor) -> Tensor:
+        """``J^T J`` times vectors (N,) or (N, k)."""
+        result: Tensor = self.jacobian_transpose @ (self.jacobian @ vectors)
+        return result
+
+    def preconditioner(self, damping: Tensor) -> Tensor:
+        """Inverse of the damped diagonal blocks, as a CSR matrix."""
+        parts = self.structure.layout.unflatten(damping)
+        inverses = [
+            block_inverse(block + torch.diag_embed(parts[name])) for name, block in self.diagonal_blocks.items()
+        ]
+        return self.structure.block_diagonal.matrix(torch.cat([inverse.reshape(-1) for inverse in inverses]))
+
     @cached_property
-    def normal_values(self) -> Tensor:
+    def lower_values(self) -> Tensor:
         """Values of the lower triangle of ``J^T J`` in the order of the normal pattern."""
         return self.structure.normal_pattern.assemble(self.jacobians)
 
