@@ -66,6 +66,15 @@ class AffinePart:
         """(rows,) scaled residuals; half the sum of their squares is the merit of the linear terms."""
         return self.change(flat).add_(self.offset)
 
+    def member_sums(self, rows: Tensor, members: int) -> Tensor:
+        """(members,) sums of (rows,) values over the rows of each member of a batch."""
+        return torch.stack([part.view(members, -1).sum(1) for part in torch.split(rows, self._sizes)]).sum(0)
+
+    def member_owners(self, members: int) -> Tensor:
+        """(rows,) number of the member that a row belongs to."""
+        every = torch.arange(members, device=self.offset.device)
+        return torch.cat([every.repeat_interleave(size // members) for size in self._sizes])
+
     def change(self, step: Tensor) -> Tensor:
         """(rows,) by how much a step (N,) changes the scaled residuals."""
         result: Tensor = self._whole @ step

@@ -9,13 +9,14 @@ from torch import Tensor
 
 from .._threads import threads_for
 from ..errors import ShapeError
+from .batch import BatchRun
 from .layout import State
 from .problem import Problem
 from .result import ProjectionResult
 from .run import Callback, Observe, Run
 from .settings import ProjectionSettings
-from .steps import Guard
 from .term import ElementTerm
+from .trials import Guard
 
 
 def guided_projection(
@@ -75,16 +76,35 @@ class GuidedProjection(Problem):
         observe: Observe | None = None,
         guard: Guard | None = None,
     ) -> ProjectionResult:
-        """Iterates from ``blocks``; see :func:`guided_projection`. The linear solver is that of the constructor."""
+        """Iterates from ``blocks``; see :func:`guided_projection`.
+
+        The linear solver is that of the constructor, unless the settings name another one, which is then kept for the
+        next time.
+        """
         settings = settings or ProjectionSettings()
+        problem = self.solved_by(settings.solver)
         with torch.no_grad(), threads_for(self.layout.num_unknowns, self.structure.device):
-            return Run(self, blocks, settings, callback, observe, guard).result()
+            return Run(problem, blocks, settings, callback, observe, guard).result()
 
     def solve_batch(self, blocks: State, *, settings: ProjectionSettings | None = None) -> list[ProjectionResult]:
-        """Iterates from every member of blocks ``(batch, n, d)``, one result each."""
+        """Iterates from every member of blocks ``(batch, n, d)`` at once, one result each.
+
+        The members share terms and fixed unknowns. They are solved as one system with their block structure, which is
+        many times as fast as one after the other where they are small. Damping, acceptance and convergence are those of
+        each member, so results are the same up to rounding; only a singular system raises the damping of all.
+
+        Raises:
+            ShapeError: blocks are not ``(batch, n, d)`` of the sizes compiled for.
+            TorchfairError: see :func:`guided_projection`.
+        """
+        settings = settings or ProjectionSettings()
         counts = {block.shape[0] for block in blocks.values()}
         if len(counts) != 1 or any(block.ndim != 3 for block in blocks.values()):
             shapes = [tuple(block.shape) for block in blocks.values()]
             raise ShapeError("blocks", "(batch, n, d) with one batch size", shapes)
-        members = [{name: block[i] for name, block in blocks.items()} for i in range(counts.pop())]
-        return [self.solve(member, settings=settings) for member in members]
+        if counts == {0}:
+            return []
+        self.check_blocks({name: block[0] for name, block in blocks.items()})
+        size = self.layout.num_unknowns * counts.pop()
+        with torch.no_grad(), threads_for(size, self.structure.device):
+            return BatchRun(self.solved_by(settings.solver), blocks, settings).results()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -12,8 +11,9 @@ from .problem import Problem
 from .result import IterationRecord, ProjectionResult, Status
 from .settings import ProjectionSettings
 from .state import ProjectionState
-from .steps import Guard, finished, init, step
+from .steps import finished, init, record_of, step
 from .stopwatch import Stopwatch
+from .trials import Guard
 
 _PARTS = ("linearise", "solve", "merit")
 
@@ -66,15 +66,14 @@ class Run:
 
     def _loop(self) -> Status:
         state = self._start
-        start = IterationRecord(0, state.merit, math.nan, math.nan, 0.0, state.gradient, True, 0, 0.0)
-        if self._stops(start, state):
+        if self._stops(record_of(state), state):
             return Status.CALLBACK
         limit = state.settings.time_limit
         while (status := finished(self._state)) is None:
             if limit is not None and self._watch.elapsed > limit:
                 return Status.TIME_LIMIT
             self._state, record = step(self._problem, self._state, self._guard)
-            if self._state.status is not Status.SINGULAR and self._stops(record, self._state):
+            if finished(self._state) is not Status.SINGULAR and self._stops(record, self._state):
                 return Status.CALLBACK
         return status
 

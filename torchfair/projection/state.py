@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-from .damping import Damping
+from .course import Course
 from .inequalities import Inequalities
-from .result import Status
 from .settings import ProjectionSettings
 from .system import Evaluation, LinearSystem
 
@@ -21,13 +20,11 @@ class Linearised:
         system: Jacobians and residuals; of the inequalities those that are broken.
         inequalities: All of them, None if there are none.
         scale: (N,) positive diagonal that the damping multiplies.
-        gradient: Largest scaled component of the gradient of the merit.
     """
 
     system: LinearSystem
     inequalities: Inequalities | None
     scale: Tensor
-    gradient: float
 
 
 @dataclass(frozen=True)
@@ -35,38 +32,40 @@ class ProjectionState:
     """The best blocks found so far and all that is carried from step to step. Immutable.
 
     Attributes:
-        evaluation: Blocks, residuals and merit.
+        evaluation: Blocks, residuals and merits.
         linearised: There.
         settings: Tolerances and damping.
-        damping: Levenberg-Marquardt parameter of the next step.
-        accuracy: Relative remainder asked of an iterative linear solver.
-        iteration: Damped steps tried so far.
-        falls: Relative decreases of the merit in accepted steps, the last ones.
+        courses: Merit, damping and status of each member of a batch; one for a single problem.
         heeded: Inequalities that the last step took for equations.
-        status: Why the last step ended the run, if it did.
     """
 
     evaluation: Evaluation
     linearised: Linearised
     settings: ProjectionSettings
-    damping: Damping
-    accuracy: float
-    iteration: int = 0
-    falls: tuple[float, ...] = ()
+    courses: tuple[Course, ...]
     heeded: Tensor | None = None
-    status: Status | None = None
 
     @property
     def blocks(self) -> dict[str, Tensor]:
-        """The variable blocks."""
+        """The variable blocks, of all members one after the other."""
         return dict(self.evaluation.state)
 
     @property
     def merit(self) -> float:
-        """Their merit."""
-        return self.evaluation.merit
+        """Sum over members."""
+        return sum(course.merit for course in self.courses)
 
     @property
     def gradient(self) -> float:
-        """Largest scaled component of the gradient."""
-        return self.linearised.gradient
+        """Largest scaled component of the gradient, see ``ProjectionResult``."""
+        return max(course.gradient for course in self.courses)
+
+    @property
+    def damping(self) -> float:
+        """Levenberg-Marquardt parameter of the next step, of the first member."""
+        return self.courses[0].damping.value
+
+    @property
+    def accuracy(self) -> float:
+        """Relative remainder asked of an iterative linear solver."""
+        return min(course.accuracy for course in self.courses)

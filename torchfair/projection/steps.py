@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
 from torch import Tensor
 
-from ..errors import SingularSystemError
+from ..errors import SettingsError, SingularSystemError
+from .course import Course, Outcome
 from .damping import Damping
 from .evaluate import check_start
 from .inequalities import Inequalities
@@ -21,13 +22,9 @@ from .settings import ProjectionSettings
 from .state import Linearised, ProjectionState
 from .stopwatch import Stopwatch
 from .system import Evaluation, LinearSystem
+from .trials import Guard, Trials
 
-Guard = Callable[[State, State], bool]
-
-_LEAST_GAIN = 1e-4
-_TIGHTEST_ACCURACY = 1e-8
 _LONGEST_EXTRAPOLATION = 3.0
-_PATIENCE_WHEN_DAMPED = 4
 
 
 @torch.no_grad()
@@ -41,14 +38,46 @@ def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = 
 
     Raises:
         ShapeError: blocks have other sizes.
+        SettingsError: settings ask for another linear solver than the problem was made for.
         TorchfairError: a residual or Jacobian is not finite at the start; names the term and its elements.
     """
     settings = settings or ProjectionSettings()
+    if problem.solved_by(settings.solver) is not problem:
+        raise SettingsError(
+            f"the problem was made for the linear solver '{problem.solver.name}', but settings ask for another one: "
+            "make it with that one, or take problem.solved_by(settings.solver)"
+        )
     problem.check_blocks(blocks)
     evaluation = problem.structure.evaluate({name: block.detach().clone() for name, block in blocks.items()})
     check_start(problem.structure, evaluation)
-    linearised = _linearise(problem, evaluation, settings)
-    return ProjectionState(evaluation, linearised, settings, Damping(settings.initial_damping), settings.accuracy)
+    linearised, gradients = _linearise(problem, evaluation, settings)
+    damping = Damping(settings.initial_damping)
+    courses = [
+        Course(merit, gradient, damping, settings.accuracy)
+        for merit, gradient in zip(evaluation.merits.tolist(), gradients, strict=True)
+    ]
+    return ProjectionState(evaluation, linearised, settings, tuple(courses))
+
+
+@torch.no_grad()
+def of_members(problem: Problem, state: ProjectionState, chosen: list[int]) -> tuple[Problem, ProjectionState]:
+    """The problem and the state of some members of a batch alone, to go on without the others.
+
+    Args:
+        problem: Of one member.
+        state: Of the batch.
+        chosen: Numbers of members.
+    """
+    layout, before = state.linearised.system.structure.layout, state.linearised
+    smaller = problem.batched(len(chosen))
+    flat = layout.chosen_members(layout.flatten(state.evaluation.state), chosen)
+    evaluation = smaller.structure.evaluate(smaller.layout.unflatten(flat))
+    linearised, _ = _linearise(smaller, evaluation, state.settings)
+    heeded = state.heeded
+    if heeded is not None and before.inequalities is not None:
+        heeded = before.inequalities.chosen_members(heeded, chosen)
+    courses = tuple(state.courses[member] for member in chosen)
+    return smaller, replace(state, evaluation=evaluation, linearised=linearised, courses=courses, heeded=heeded)
 
 
 @torch.no_grad()
@@ -58,64 +87,57 @@ def step(
     """One damped step.
 
     Args:
-        problem: That of the state; its data and weights may have changed (see :meth:`Problem.with_terms`) if the state
-            was made anew by :func:`init`.
+        problem: That of the state.
         state: Not modified.
         guard: ``guard(blocks, trial)`` refuses a trial by returning False.
 
     Returns:
         The next state, equal in its blocks to the last one if the step was not accepted, and what happened.
     """
-    watch = Stopwatch()
+    watch, settings, layout = Stopwatch(), state.settings, problem.layout
     problem.prepare()
     with watch.part("solve"):
-        proposal, damping = _propose(problem, state)
-    number = state.iteration + 1
+        proposal, dampings = _propose(problem, state)
     if proposal is None:
-        record = _record(number, state, damping.value, math.nan, 0.0, False, 0, watch)
-        return replace(state, iteration=number, damping=damping, status=Status.SINGULAR), record
-    attempt = _Attempt(problem, state, guard, watch)
-    flat = problem.layout.flatten(state.evaluation.state)
-    trial = attempt.evaluate(flat + proposal.change)
-    fall = -math.inf if trial is None else state.merit - trial.merit
-    gain = fall / proposal.predicted if proposal.predicted > 0.0 else -math.inf
-    size, reach = float(proposal.change.abs().max()), float(flat.abs().max())
-    short = size <= state.settings.step_tolerance * (reach + state.settings.step_tolerance)
-    after = replace(state, iteration=number, heeded=proposal.heeded)
-    if trial is None or not (fall > 0.0 and gain > _LEAST_GAIN):
-        after = replace(after, damping=damping.rejected())
-        if short or after.damping.exhausted:
-            after = replace(after, status=Status.STALLED)
-        return after, _record(number, after, damping.value, gain, size, False, proposal.iterations, watch)
-    best = attempt.extrapolated(trial, flat, proposal.change, gain)
-    with watch.part("linearise"):
-        linearised = _linearise(problem, best, state.settings)
-    after = replace(after, evaluation=best, linearised=linearised, damping=damping.accepted(gain))
-    after = _settled(problem, after, (state.merit - best.merit) / state.merit, damping.value)
-    if short:
-        after = replace(after, status=Status.STEP_TOLERANCE)
-    return after, _record(number, after, damping.value, gain, size, True, proposal.iterations, watch)
+        return _singular(state, dampings, watch)
+    trials = Trials(problem, state, proposal, guard, watch)
+    _try(trials, proposal, state)
+    best = trials.best()
+    linearised, gradients = state.linearised, [course.gradient for course in state.courses]
+    if best is not None:
+        with watch.part("linearise"):
+            linearised, gradients = _linearise(problem, best, settings)
+    sizes = layout.member_largest(proposal.change.abs())
+    short = sizes <= settings.step_tolerance * (trials.reach + settings.step_tolerance)
+    outcomes = map(Outcome, dampings, trials.gains, sizes.tolist(), short.tolist(), trials.taken)
+    courses = tuple(
+        course
+        if course.finished(settings)
+        else course.after(outcome, merit, gradient, settings, inexact=problem.solver.inexact)
+        for course, outcome, merit, gradient in zip(state.courses, outcomes, trials.merits, gradients, strict=True)
+    )
+    evaluation = best or state.evaluation
+    after = replace(state, evaluation=evaluation, linearised=linearised, courses=courses, heeded=proposal.heeded)
+    return after, record_of(after, inner_iterations=proposal.iterations, timings=watch.parts)
 
 
 def finished(state: ProjectionState) -> Status | None:
-    """Why a run ends at this state; None if it goes on."""
-    if state.status is not None:
-        return state.status
-    if state.merit == 0.0:
-        return Status.ZERO_MERIT
-    if state.gradient <= state.settings.gradient_tolerance:
-        return Status.GRADIENT_TOLERANCE
-    return Status.MAX_ITERATIONS if state.iteration >= state.settings.max_iterations else None
+    """Why a run ends at this state; None if it goes on. A batch goes on while a member does."""
+    statuses = [course.finished(state.settings) for course in state.courses]
+    return None if None in statuses else statuses[0]
 
 
-def _linearise(problem: Problem, evaluation: Evaluation, settings: ProjectionSettings) -> Linearised:
+def _linearise(
+    problem: Problem, evaluation: Evaluation, settings: ProjectionSettings
+) -> tuple[Linearised, list[float]]:
+    """Also the largest scaled component of the gradient, for each member."""
     system = problem.structure.linearise(evaluation)
     inequalities = Inequalities.of(system)
     if inequalities is not None:
         system = inequalities.heeding(inequalities.broken)
     scale = _scale(system, settings)
-    gradient = float((system.gradient.abs() / scale.sqrt()).max())
-    return Linearised(system, inequalities, scale, gradient)
+    gradients: list[float] = problem.layout.member_largest(system.gradient.abs() / scale.sqrt()).tolist()
+    return Linearised(system, inequalities, scale), gradients
 
 
 def _scale(system: LinearSystem, settings: ProjectionSettings) -> Tensor:
@@ -128,86 +150,68 @@ def _scale(system: LinearSystem, settings: ProjectionSettings) -> Tensor:
     return torch.where(diagonal > 0.0, floored, torch.ones_like(diagonal))
 
 
-def _propose(problem: Problem, state: ProjectionState) -> tuple[Proposal | None, Damping]:
+def _propose(problem: Problem, state: ProjectionState) -> tuple[Proposal | None, list[Damping]]:
     """A solution of the damped system, None where it is singular at every damping; and the damping it needed."""
-    damping, at = state.damping, state.linearised
-    while not damping.exhausted:
-        diagonal = damping.value * at.scale
+    dampings, at = [course.damping for course in state.courses], state.linearised
+    while not any(damping.exhausted for damping in dampings):
+        values = at.scale.new_tensor([damping.value for damping in dampings])
+        diagonal = problem.layout.member_spread(values) * at.scale
         try:
             if at.inequalities is None:
-                factor = problem.solver.factorise(at.system, diagonal)
-                return Proposal.of(at.system, factor, diagonal, state.accuracy), damping
-            return at.inequalities.propose(problem.solver, diagonal, state.heeded, state.accuracy), damping
+                return Proposal.of(at.system, problem.solver, diagonal, state.accuracy), dampings
+            return at.inequalities.propose(problem.solver, diagonal, state.heeded, state.accuracy), dampings
         except SingularSystemError:
-            damping = damping.rejected()
-    return None, damping
+            dampings = [damping.rejected() for damping in dampings]
+    return None, dampings
 
 
-class _Attempt:
-    """Trials of one step."""
-
-    def __init__(self, problem: Problem, state: ProjectionState, guard: Guard | None, watch: Stopwatch) -> None:
-        self._problem, self._state, self._guard, self._watch = problem, state, guard, watch
-
-    def evaluate(self, flat: Tensor) -> Evaluation | None:
-        """A state, unless the guard refuses it."""
-        trial = self._problem.layout.unflatten(flat)
-        if self._guard is not None and not self._guard(self._state.evaluation.state, trial):
-            return None
-        with self._watch.part("merit"):
-            return self._problem.structure.evaluate(trial)
-
-    def extrapolated(self, trial: Evaluation, flat: Tensor, change: Tensor, gain: float) -> Evaluation:
-        """Goes on along a step that gained more than predicted, to the minimum of the parabola seen.
-
-        A reweighted model lies above the merit: with a gain of 1.5 its curvature is twice too large, and
-        the best step along the same line is twice as long.
-        """
-        factor = min(1.0 / (2.0 - gain), _LONGEST_EXTRAPOLATION) if gain < 2.0 else _LONGEST_EXTRAPOLATION
-        if factor > self._state.settings.least_extrapolation:
-            farther = self.evaluate(flat + factor * change)
-            if farther is not None and farther.merit < trial.merit:
-                return farther
-        return trial
+def _try(trials: Trials, proposal: Proposal, state: ProjectionState) -> None:
+    """Offers the step, the step corrected for curvature, and a longer one where it gained more than promised."""
+    change, settings = proposal.change, state.settings
+    trial = trials.offer(change)
+    bent = [gain < settings.least_gain_uncorrected for gain in trials.gains]
+    if trial is not None and any(bent):
+        trials.offer(proposal.corrected(trial, change, state.accuracy), bent)
+    # A reweighted model lies above the merit: with a gain of 1.5 its curvature is twice too large, and
+    # the best step along the same line is twice as long.
+    factors = [_extrapolation(gain) for gain in trials.gains]
+    longer = [factor > settings.least_extrapolation for factor in factors]
+    if any(longer):
+        spread = proposal.system.structure.layout.member_spread(change.new_tensor(factors))
+        trials.offer(spread * change, longer, again=True)
 
 
-def _settled(problem: Problem, state: ProjectionState, fall: float, damping: float) -> ProjectionState:
-    """Whether the merit has come to rest; if so, with an iterative linear solver also when that is tightened.
-
-    Steps that heavy damping kept short say little, so more of them are waited for. A relative remainder
-    changes the decrease of the merit by its square, hence the tightest one worth asking for.
-    """
-    settings = state.settings
-    patience = settings.patience * (1 if damping <= settings.initial_damping else _PATIENCE_WHEN_DAMPED)
-    falls = (*state.falls, fall)[-_PATIENCE_WHEN_DAMPED * settings.patience :]
-    state = replace(state, falls=falls)
-    if len(falls) < patience or max(falls[-patience:]) >= settings.merit_tolerance:
-        return state
-    tightest = max(0.1 * math.sqrt(settings.merit_tolerance), _TIGHTEST_ACCURACY)
-    if problem.solver.inexact and state.accuracy > tightest:
-        return replace(state, accuracy=max(0.1 * state.accuracy, tightest), falls=())
-    return replace(state, status=Status.MERIT_TOLERANCE)
+def _extrapolation(gain: float) -> float:
+    """Length, in steps, at which a parabola is lowest that starts as promised and has the gain seen."""
+    return min(1.0 / (2.0 - gain), _LONGEST_EXTRAPOLATION) if gain < 2.0 else _LONGEST_EXTRAPOLATION
 
 
-def _record(
-    number: int,
-    state: ProjectionState,
-    damping: float,
-    gain: float,
-    size: float,
-    accepted: bool,
-    inner: int,
-    watch: Stopwatch,
+def _singular(
+    state: ProjectionState, dampings: Sequence[Damping], watch: Stopwatch
+) -> tuple[ProjectionState, IterationRecord]:
+    courses = []
+    for course, damping in zip(state.courses, dampings, strict=True):
+        last = Outcome(damping, -math.inf, 0.0, False, False)
+        courses.append(replace(course, iteration=course.iteration + 1, last=last, status=Status.SINGULAR))
+    after = replace(state, courses=tuple(courses))
+    return after, record_of(after, inner_iterations=0, timings=watch.parts)
+
+
+def record_of(
+    state: ProjectionState, member: int = 0, *, inner_iterations: int = 0, timings: dict[str, float] | None = None
 ) -> IterationRecord:
+    """What became of the last step of a member; of the start where no step has been made."""
+    course = state.courses[member]
+    last = course.last or Outcome(Damping(math.nan), math.nan, 0.0, False, True)
     return IterationRecord(
-        iteration=number,
-        merit=state.merit,
-        damping=damping,
-        gain=gain,
-        step=size,
-        gradient=state.gradient,
-        accepted=accepted,
-        inner_iterations=inner,
+        iteration=course.iteration,
+        merit=course.merit,
+        damping=last.damping.value,
+        gain=last.gain,
+        step=last.size,
+        gradient=course.gradient,
+        accepted=last.accepted,
+        inner_iterations=inner_iterations,
         elapsed=0.0,
-        timings=watch.parts,
+        timings=timings or {},
     )

@@ -29,13 +29,14 @@ class Evaluation(NamedTuple):
 
     Attributes:
         state: The blocks.
-        merit: Sum of all terms; infinity where a residual is not finite, so that such a state is never accepted.
+        merits: (members,) sums of all terms, one for each member of a batch; infinity where a residual is not finite,
+            so that such a state is never accepted.
         arguments, values: Of each term of ``Structure.compiled``, unscaled.
         affine: Scaled residuals of the linear terms.
     """
 
     state: State
-    merit: float
+    merits: Tensor
     arguments: list[tuple[Tensor, ...]]
     values: list[Tensor]
     affine: Tensor | None
@@ -120,6 +121,12 @@ class Structure:
         total: Tensor = self._scatter @ torch.cat([part.reshape(-1) for part in local])
         return total
 
+    def member_sums(self, local: Sequence[Tensor]) -> Tensor:
+        """(members,) sums of local values ``(m, n)`` of the terms that are not linear."""
+        members = self.layout.members
+        parts = [part.view(part.shape[0], members, -1).sum((0, 2)) for part in local]
+        return torch.stack([self._like.new_zeros(members), *parts]).sum(0)
+
     @cached_property
     def normal_pattern(self) -> NormalPattern:
         """Sparsity of the normal matrix and the map into it."""
@@ -139,28 +146,38 @@ class Structure:
 
     def evaluate(self, state: State) -> Evaluation:
         """Residuals and merit of a state."""
-        total, arguments, values = 0.0, [], []
+        arguments, values, parts = [], [], [self._like.new_zeros(self.layout.members)]
         for term in (compiled.term for compiled in self.compiled):
             arguments.append(term.arguments(state))
             values.append(term.values(arguments[-1]))
-            total += float(term.contributions(arguments[-1], values[-1]).sum())
+            contributions = term.contributions(arguments[-1], values[-1])
+            parts.append(contributions.view(self.layout.members, -1).sum(1).to(self._like))
         affine = None
         if self.affine is not None:
             affine = self.affine.residual(self.layout.flatten(state))
-            total += 0.5 * float(affine.square().sum())
-        merit = total if total == total and total != float("-inf") else float("inf")
-        return Evaluation(state, merit, arguments, values, affine)
+            parts.append(0.5 * self.affine.member_sums(affine.square(), self.layout.members))
+        merits = torch.stack(parts).sum(0)
+        merits = torch.where(torch.isfinite(merits), merits, torch.inf)
+        return Evaluation(state, merits, arguments, values, affine)
+
+    def unknowns_of_infinite_elements(self, at: Evaluation) -> Tensor:
+        """(N,) bool: unknowns of elements whose share of the merit is not finite."""
+        bad = []
+        for compiled, arguments, values in zip(self.compiled, at.arguments, at.values, strict=True):
+            infinite = ~torch.isfinite(compiled.term.contributions(arguments, values))
+            bad.append(infinite.to(self._like).expand_as(compiled.unknowns))
+        return self.scatter(bad) > 0.0
 
     def linearise(self, state: State | Evaluation) -> LinearSystem:
         """Residuals and Jacobians of all terms at a state, scaled by the square roots of their weights."""
         at = state if isinstance(state, Evaluation) else self.evaluate(state)
-        jacobians, residuals = [], []
+        jacobians, residuals, roots = [], [], []
         for compiled, free, arguments, values in zip(self.compiled, self._free, at.arguments, at.values, strict=True):
-            root = compiled.term.roots(values)
-            residuals.append(apply_root(root, values).T)
-            jacobian = _scaled(compiled.term.jacobians(arguments), root)
+            roots.append(compiled.term.roots(values))
+            residuals.append(apply_root(roots[-1], values).T)
+            jacobian = _scaled(compiled.term.jacobians(arguments), roots[-1])
             jacobians.append(jacobian if free is None else jacobian.mul_(free))
-        return LinearSystem(self, jacobians, residuals, at.affine)
+        return LinearSystem(self, jacobians, residuals, roots, at.affine)
 
 
 class LinearSystem:
@@ -171,23 +188,57 @@ class LinearSystem:
     Attributes:
         jacobians: for each term of ``Structure.compiled`` ``(m, K, n)``, unknowns as in ``CompiledTerm``.
         residuals: likewise ``(m, n)``.
+        roots: square roots of the weights that both are scaled by, see ``ElementTerm.roots``.
         affine_residual: of the linear terms.
     """
 
     def __init__(
-        self, structure: Structure, jacobians: list[Tensor], residuals: list[Tensor], affine_residual: Tensor | None
+        self,
+        structure: Structure,
+        jacobians: list[Tensor],
+        residuals: list[Tensor],
+        roots: list[Tensor],
+        affine_residual: Tensor | None,
     ) -> None:
         self.structure = structure
         self.jacobians = jacobians
         self.residuals = residuals
+        self.roots = roots
         self.affine_residual = affine_residual
 
     @cached_property
     def gradient(self) -> Tensor:
         """``J^T r``, the gradient of the merit."""
-        total = self.structure.scatter([_contract(j, r) for j, r in zip(self.jacobians, self.residuals, strict=True)])
-        if self.structure.affine is not None and self.affine_residual is not None:
-            total += self.structure.affine.gradient(self.affine_residual)
+        return self._pulled_back(self.residuals, self.affine_residual)
+
+    def gradient_with(self, other: Evaluation) -> Tensor:
+        """``J^T r`` with the residuals of another state, in the weights of this one."""
+        residuals = [apply_root(root, values).T for root, values in zip(self.roots, other.values, strict=True)]
+        return self._pulled_back(residuals, other.affine)
+
+    def _pulled_back(self, residuals: Sequence[Tensor], affine: Tensor | None) -> Tensor:
+        total = self.structure.scatter([_contract(j, r) for j, r in zip(self.jacobians, residuals, strict=True)])
+        if self.structure.affine is not None and affine is not None:
+            total += self.structure.affine.gradient(affine)
+        return total
+
+    def changes(self, step: Tensor) -> tuple[list[Tensor], Tensor | None]:
+        """By how much a step (N,) changes the residuals of the model: of each term (m, n), and of the linear terms."""
+        terms = [
+            torch.einsum("mkn,kn->mn", jacobian, step[compiled.unknowns])
+            for compiled, jacobian in zip(self.structure.compiled, self.jacobians, strict=True)
+        ]
+        return terms, None if self.structure.affine is None else self.structure.affine.change(step)
+
+    def predicted_fall(self, step: Tensor) -> Tensor:
+        """(members,) by how much the merit of the linearised residuals falls with a step (N,)."""
+        structure = self.structure
+        members = structure.layout.members
+        total = -structure.layout.member_sums(step * self.gradient)
+        terms, affine = self.changes(step)
+        total -= 0.5 * structure.member_sums([change.square() for change in terms])
+        if affine is not None and structure.affine is not None:
+            total -= 0.5 * structure.affine.member_sums(affine.square(), members)
         return total
 
     @cached_property
