@@ -9,19 +9,19 @@ import torch
 from torch import Tensor
 
 from .. import constraints as c
-from ..boundary import boundary_corners, boundary_pieces
+from ..boundary import boundary_corners
 from ..constraints.closeness import TangentPlanes
 from ..constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
 from ..energies import normal_variation
 from ..errors import MeshError
 from ..geometry import corner_angles, face_areas, face_normals
-from ..geometry.closest_curve_point import ReferenceCurves
 from ..geometry.closest_point import ReferenceSurface
 from ..geometry.planarity import planarity
 from ..projection import ElementTerm
 from ..projection.layout import State
 from ..topology import Topology
 from .checks import refuse_degenerate_faces
+from .gliding_boundary import GlidingBoundary
 from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)
@@ -60,7 +60,7 @@ class FairProblem:
         self.targets = torch.stack(list(targets.values())) if targets else torch.zeros(0, 3, dtype=vertices.dtype)
         self.design_mode = self._leaves_reference()
         self.corners = boundary_corners(vertices, topology, settings.corner_angle)
-        self.corners[self.handles] = False
+        self.boundary = self._gliding_boundary()
         self.fixed = {"vertices": self._fixed_vertices()[:, None].expand(-1, 3).clone()}
         self.planar_faces = self._choose_planar_faces()
         self._common = [
@@ -175,36 +175,46 @@ class FairProblem:
         if self.design_mode:
             return []
         used = self.topology.valences > 0
-        terms = c.closeness_terms(self._planes, self.topology.num_vertices, weight=self.settings.closeness_weight)
+        close = used if self.boundary is None else used & ~self.boundary.held
+        chosen = torch.nonzero(close).squeeze(1)
+        terms = c.closeness_terms(self._planes, chosen, weight=self.settings.closeness_weight)
         if self.settings.distance_limit is not None:
-            distances = self.reference.closest(self.vertices).distances
+            distances = self.distances(self.vertices)
             limits = distances.clamp_min(self.settings.distance_limit) * (1.0 + 1e-9)  # rounding at the start
             far = int((distances > self.settings.distance_limit)[used].sum())
             if far:
                 self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")
-            terms += c.distance_limit_terms(self._planes, limits, weight=self.settings.quality_weight)
+            terms += c.distance_limit_terms(self._nearest, limits, weight=self.settings.quality_weight)
         return terms
 
-    def _boundary(self) -> list[ElementTerm]:
+    def _nearest(self, state: State) -> tuple[Tensor, Tensor]:
+        """Planes from which distances are measured: of gliding vertices from the surface or from their curve."""
+        planes = self._planes(state)
+        return planes if self.boundary is None else self.boundary.nearest(state, *planes)
+
+    def distances(self, vertices: Tensor) -> Tensor:
+        """(V,) distances from the reference surface or, where a vertex glides on a curve that is nearer, from that."""
+        positions, _ = self._nearest({"vertices": vertices})
+        distances: Tensor = torch.linalg.vector_norm(vertices - positions, dim=1)
+        return distances
+
+    def boundary_distances(self, vertices: Tensor) -> Tensor:
+        """(n,) distances of gliding vertices from their curves."""
+        feet = self.boundary.feet if self.boundary is not None else None
+        return vertices.new_zeros(0) if feet is None else feet({"vertices": vertices}).distances
+
+    def _gliding_boundary(self) -> GlidingBoundary | None:
         if self.settings.boundary != "glide":
+            return None
+        return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles)
+
+    def _boundary(self) -> list[ElementTerm]:
+        if self.boundary is None or self.boundary.feet is None:
             return []
-        vertices, owners, curves, closed = [], [], [], []
-        for number, piece in enumerate(boundary_pieces(self.topology, self.corners)):
-            gliding = piece.vertices[~self.corners[piece.vertices]]
-            gliding = gliding[~torch.isin(gliding, self.handles)]
-            vertices.append(gliding)
-            owners.append(torch.full_like(gliding, number))
-            curves.append(self.vertices[piece.vertices])
-            closed.append(piece.closed)
-        if not curves:
-            return []
-        terms = c.gliding_terms(
-            ReferenceCurves(curves, closed),
-            torch.cat(vertices),
-            torch.cat(owners),
-            weight=self.settings.boundary_weight,
-        )
-        return terms + c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight)
+        return [
+            *c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight),
+            *c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight),
+        ]
 
     def _quality(self) -> list[ElementTerm]:
         settings = self.settings
