@@ -26,15 +26,20 @@ class CurveFeet:
         self, curves: SplineCurves, vertices: Tensor, curve_of_vertex: Tensor, *, block: str = "vertices"
     ) -> None:
         self.curves, self.vertices, self.curve_of_vertex, self.block = curves, vertices, curve_of_vertex, block
-        self._answer: tuple[Tensor, int, SplineFeet] | None = None
+        self._asked: tuple[Tensor, int] | None = None
+        self._answer: SplineFeet | None = None
 
     def __call__(self, state: State) -> SplineFeet:
         """Feet (n, ...) for the vertices of the state."""
         points = state[self.block]
-        # The same tensor, not equal ones: to compare values would make the host wait for a device.
-        if self._answer is None or self._answer[0] is not points or self._answer[1] != points._version:
-            self._answer = points, points._version, self.curves.closest(points[self.vertices], self.curve_of_vertex)
-        return self._answer[2]
+        if self._answer is None or not self._is_last(points):
+            self._answer = self.curves.closest(points[self.vertices], self.curve_of_vertex)
+            self._asked = None if points.is_inference() else (points, points._version)
+        return self._answer
+
+    def _is_last(self, points: Tensor) -> bool:
+        """Whether these are the very points asked for last; comparing their values would wait for other devices."""
+        return self._asked is not None and points is self._asked[0] and points._version == self._asked[1]
 
 
 def offset_from_curve(x: Tensor, foot: Tensor, tangent: Tensor) -> Tensor:

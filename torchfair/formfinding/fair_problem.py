@@ -12,16 +12,16 @@ from .. import constraints as c
 from ..boundary import boundary_corners
 from ..constraints.closeness import TangentPlanes
 from ..constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
-from ..energies import normal_variation
-from ..errors import MeshError
-from ..geometry import corner_angles, face_areas, face_normals
+from ..geometry import corner_angles, face_areas
 from ..geometry.closest_point import ReferenceSurface
 from ..geometry.planarity import planarity
 from ..projection import ElementTerm
 from ..projection.layout import State
 from ..topology import Topology
 from .checks import refuse_degenerate_faces
+from .fair_guard import FairGuard
 from .gliding_boundary import GlidingBoundary
+from .planar_faces import faces_to_keep_planar
 from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)
@@ -60,9 +60,9 @@ class FairProblem:
         self.targets = torch.stack(list(targets.values())) if targets else torch.zeros(0, 3, dtype=vertices.dtype)
         self.design_mode = self._leaves_reference()
         self.corners = boundary_corners(vertices, topology, settings.corner_angle)
-        self.boundary = self._gliding_boundary()
         self.fixed = {"vertices": self._fixed_vertices()[:, None].expand(-1, 3).clone()}
-        self.planar_faces = self._choose_planar_faces()
+        self.planar_faces = self._planar_faces()
+        self.boundary = self._gliding_boundary()
         self._common = [
             *self._closeness(),
             *self._boundary(),
@@ -136,22 +136,9 @@ class FairProblem:
         fixed[self.handles] = False
         return fixed
 
-    def _choose_planar_faces(self) -> Tensor:
-        polygons = self.topology.face_sizes > 3
-        chosen = self.settings.planar
-        if not isinstance(chosen, str):
-            faces = torch.tensor(chosen, dtype=torch.int64)
-            if faces.numel() and not bool(((faces >= 0) & (faces < self.topology.num_faces)).all()):
-                raise MeshError(
-                    f"planar: face numbers run from 0 to {self.topology.num_faces - 1}, got {list(chosen)[:5]}"
-                )
-            return faces
-        if chosen == "keep":
-            polygons = polygons & (planarity(self.vertices, self.topology) < self.settings.planar_tolerance)
-        elif chosen == "none":
-            polygons = torch.zeros_like(polygons)
-        faces = torch.nonzero(polygons).squeeze(1)
-        if faces.numel():
+    def _planar_faces(self) -> Tensor:
+        faces = faces_to_keep_planar(self.vertices, self.topology, self.settings)
+        if faces.numel() and isinstance(self.settings.planar, str):
             self.notes.append(f"{faces.numel()} of {self.topology.num_faces} faces are kept planar")
         return faces
 
@@ -206,7 +193,9 @@ class FairProblem:
     def _gliding_boundary(self) -> GlidingBoundary | None:
         if self.settings.boundary != "glide":
             return None
-        return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles)
+        planar = torch.zeros_like(self.corners)
+        planar[self.topology.corners[torch.isin(self.topology.corner_faces, self.planar_faces)]] = True
+        return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles, planar)
 
     def _boundary(self) -> list[ElementTerm]:
         if self.boundary is None or self.boundary.feet is None:
@@ -218,8 +207,7 @@ class FairProblem:
 
     def _quality(self) -> list[ElementTerm]:
         settings = self.settings
-        angles = corner_angles(self.vertices, self.topology)
-        smallest = min(settings.smallest_angle, float(angles.min()) * (1.0 - 1e-9))
+        angles, smallest = corner_angles(self.vertices, self.topology), self._smallest_angle
         safe = angles.clamp(max=max(_SAFE_ANGLE, 2.0 * smallest)).clamp_min(smallest + _LEAST_SAFETY)
         weight = settings.quality_weight
         return [
@@ -229,27 +217,34 @@ class FairProblem:
             ),
         ]
 
+    @cached_property
+    def _smallest_angle(self) -> float:
+        """Radians that no corner angle falls below."""
+        smallest = float(corner_angles(self.vertices, self.topology).min())
+        return min(self.settings.smallest_angle, smallest * (1.0 - 1e-9))
+
     # ---- guards ----------------------------------------------------------------------------------------
 
+    def placed(self, state: State) -> Tensor:
+        """The vertices (V, 3) of the mesh of a state: gliding ones are put on their curves."""
+        return state["vertices"] if self.boundary is None else self.boundary.placed(state)
+
     def admits(self, state: State, trial: State) -> bool:
-        """Whether a step may be taken: no face turns over, and E does not rise above that of the start.
+        """Whether a step may be taken: no face turns over, bounds hold, and E does not rise above that of the start.
 
         E may rise where handles, another reference or planarity ask for a different shape.
         """
-        if not self.keeps_faces(state, trial):
-            return False
-        return self._other_goals or float(normal_variation(trial["vertices"], self.topology)) <= self._start_energy
+        guard = self._guard
+        kept = guard.keeps_faces(state, trial) and guard.keeps_bounds(trial)
+        return kept and (self._other_goals or guard.keeps_energy(trial))
 
     @cached_property
-    def _start_energy(self) -> float:
-        return float(normal_variation(self.vertices, self.topology))
-
-    @cached_property
-    def _normals(self) -> Tensor:
-        return face_normals(self.vertices, self.topology)
-
-    def keeps_faces(self, state: State, trial: State) -> bool:
-        """Whether no face turns over: against the start, or in design mode against the last state."""
-        before = face_normals(state["vertices"], self.topology) if self.design_mode else self._normals
-        after = face_normals(trial["vertices"], self.topology)
-        return bool(((before * after).sum(1) > 0.0).all())
+    def _guard(self) -> FairGuard:
+        return FairGuard(
+            self.vertices,
+            self.topology,
+            self.placed,
+            smallest_angle=self._smallest_angle,
+            smallest_area=self.settings.smallest_area,
+            from_last=self.design_mode,
+        )
