@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Literal
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,19 +13,31 @@ import torch
 from torch import Tensor
 
 from .errors import MeshError, ShapeError
+from .geometry.spline_curves import SplineCurves
 
 Floats = npt.NDArray[np.float64]
-_Ends = Literal["periodic", "not-a-knot", "natural"]
 
 _SAMPLES = 24  # of arc length, between two points of the curve
 _DENSE = 2048  # samples of a curve that is given as a function
 
 
+class Span(NamedTuple):
+    """A smooth stretch of a closed curve: from one corner to the next, or all of a curve without corners.
+
+    Attributes:
+        points: (n, 3) float64 given points in order; of an open span with the corners at both ends.
+        closed: whether it is a whole curve without corners.
+    """
+
+    points: Tensor
+    closed: bool
+
+
 class ClosedCurve:
     """A closed curve through given points, smooth except at corners.
 
-    Pieces between corners are cubic splines through the points (fourth order accurate), a curve without
-    corners is one periodic spline. The parameter ``s`` runs from 0 to 1 once around and is proportional to
+    Between corners it is a cubic spline through the points, without corners it is one closed spline: see
+    :class:`~torchfair.geometry.SplineCurves`. The parameter ``s`` runs from 0 to 1 once around and is proportional to
     arc length; it is taken modulo 1.
 
     Args:
@@ -71,18 +83,14 @@ class ClosedCurve:
         return cls(points.to(torch.float64), corners=[i * per_piece for i in range(len(stops))] if corners else ())
 
     def _fit(self, places: Floats, cuts: list[int]) -> None:
-        from scipy.interpolate import CubicSpline
-
         count = len(places)
         first = cuts[0] if cuts else 0
         around = np.concatenate([np.roll(places, -first, axis=0), places[first : first + 1]])
+        self._stops = np.array([cut - first for cut in cuts] + [count] if cuts else [0, count])
+        self._points, self._smooth = torch.from_numpy(around), not cuts
+        self._curves = SplineCurves(*zip(*self.spans(), strict=True))
         chords = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(around, axis=0), axis=1))])
-        stops = [cut - first for cut in cuts] + [count] if cuts else [0, count]
-        self._splines = []
-        for a, b in itertools.pairwise(stops):
-            ends: _Ends = "periodic" if not cuts else "not-a-knot" if b - a > 2 else "natural"
-            self._splines.append(CubicSpline(chords[a : b + 1], around[a : b + 1], bc_type=ends))
-        self._breaks = chords[stops]
+        self._chords = chords
         # Arc length against the chord parameter, fine enough to be inverted by linear interpolation.
         steps = np.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
         fine = np.append((chords[:-1, None] + np.diff(chords)[:, None] * steps).ravel(), chords[-1])
@@ -94,13 +102,18 @@ class ClosedCurve:
         self.knots = torch.from_numpy((np.roll(knots, first) - self._start) % 1.0)
         self.corners = self.knots[torch.tensor(cuts, dtype=torch.int64)].sort().values
 
+    def spans(self) -> list[Span]:
+        """The smooth stretches, from the first corner on."""
+        if self._smooth:
+            return [Span(self._points[:-1], True)]
+        return [Span(self._points[a : b + 1], False) for a, b in itertools.pairwise(self._stops)]
+
     def _place(self, chord: Floats) -> Floats:
-        piece = np.clip(np.searchsorted(self._breaks, chord, side="right") - 1, 0, len(self._splines) - 1)
-        result = np.empty((*chord.shape, 3))
-        for number, spline in enumerate(self._splines):
-            mine = piece == number
-            result[mine] = spline(chord[mine])
-        return result
+        segment = np.clip(np.searchsorted(self._chords, chord, side="right") - 1, 0, len(self._chords) - 2)
+        span = np.searchsorted(self._stops, segment, side="right") - 1
+        fraction = (chord - self._chords[segment]) / np.diff(self._chords)[segment]
+        places = (torch.from_numpy(x) for x in (span, segment - self._stops[span], fraction))
+        return self._curves.at(*places).numpy()
 
     def at(self, parameters: Tensor) -> Tensor:
         """Positions (n, 3) float64 at parameters (n,)."""
@@ -122,15 +135,16 @@ class ClosedCurve:
         return torch.from_numpy(np.sort(np.concatenate(parts) % 1.0))
 
     def parameters_of(self, points: Tensor) -> Tensor:
-        """(n,) parameters of the places of the curve nearest to ``points`` (n, 3), to sampling accuracy."""
-        from .geometry.closest_curve_point import ReferenceCurve
-
-        s = torch.from_numpy((self._arcs[:-1] - self._start) % 1.0)
-        polyline = torch.from_numpy(self._place(self._fine[:-1]))
-        closest = ReferenceCurve(polyline, closed=True).closest(points.detach().cpu().double())
-        following = torch.cat([s[1:], s[:1]])[closest.segments]
-        here = s[closest.segments]
-        return (here + ((following - here) % 1.0) * closest.fractions) % 1.0
+        """(n,) parameters of the places of the curve nearest to ``points`` (n, 3)."""
+        asked = points.detach().cpu().double()
+        spans = len(self._stops) - 1
+        each = torch.arange(spans).repeat_interleave(len(asked))
+        feet = self._curves.closest(asked.repeat(spans, 1), each)
+        nearest = feet.distances.view(spans, -1).argmin(0, keepdim=True)
+        segment, fraction = (x.view(spans, -1).gather(0, nearest)[0].numpy() for x in (feet.segments, feet.fractions))
+        segment = segment + self._stops[nearest[0].numpy()]
+        chord = self._chords[segment] + fraction * np.diff(self._chords)[segment]
+        return torch.from_numpy((np.interp(chord, self._fine, self._arcs) - self._start) % 1.0)
 
 
 def _checked(points: Tensor) -> Floats:

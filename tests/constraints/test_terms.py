@@ -16,8 +16,8 @@ from torchfair.constraints.lifted_normal_variation import lifted_blocks, lifted_
 from torchfair.constraints.normal_variation import edge_stencils
 from torchfair.energies import normal_variation
 from torchfair.geometry import corner_angles, dihedral_angles, dual_edge_lengths, edge_lengths, face_areas
-from torchfair.geometry.closest_curve_point import ReferenceCurves
 from torchfair.geometry.closest_point import ReferenceSurface
+from torchfair.geometry.spline_curves import SplineCurves
 from torchfair.projection import ElementTerm
 
 
@@ -159,7 +159,7 @@ def test_closeness_is_the_distance_and_points_away_from_the_surface() -> None:
     vertices, topology = cube()
     planes = TangentPlanes(ReferenceSurface(vertices, topology))
     points = torch.tensor([[0.5, 0.5, 1.4], [1.3, 1.4, 0.5], [0.5, 0.4, 0.9], [-0.3, -0.4, -1.0]], dtype=DOUBLE)
-    (term,) = constraints.closeness_terms(planes, 4, weight=1.0)
+    (term,) = constraints.closeness_terms(planes, torch.arange(4), weight=1.0)
     residuals, jacobians = term.derivatives(term.arguments({"vertices": points}))
     expected = torch.tensor([0.4, 0.5, 0.1, math.sqrt(0.09 + 0.16 + 1.0)], dtype=DOUBLE)
     assert residuals[:, 0].abs().allclose(expected)
@@ -186,8 +186,9 @@ def test_distance_limit_is_a_wall() -> None:
 
 def test_gliding_is_free_along_the_curve_and_stops_at_its_ends() -> None:
     line = torch.tensor([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]], dtype=DOUBLE)
-    curves = ReferenceCurves([line], [False])
-    (term,) = constraints.gliding_terms(curves, torch.tensor([0, 1]), torch.zeros(2, dtype=torch.int64), weight=1.0)
+    curves = SplineCurves([line], [False])
+    feet = constraints.CurveFeet(curves, torch.tensor([0, 1]), torch.zeros(2, dtype=torch.int64))
+    (term,) = constraints.gliding_terms(feet, weight=1.0)
     points = torch.tensor([[0.7, 0.3, 0.4], [2.6, 0.8, 0.0]], dtype=DOUBLE)
     residuals, jacobians = term.derivatives(term.arguments({"vertices": points}))
     assert torch.linalg.vector_norm(residuals, dim=1).allclose(torch.tensor([0.5, 1.0], dtype=DOUBLE))

@@ -14,6 +14,7 @@ from .fairness import displacement_fairness_terms as displacement_fairness_terms
 from .fairness import even_fairness_terms as even_fairness_terms
 from .fairness import interior_fairness_terms as interior_fairness_terms
 from .fairness import tangential_fairness_terms as tangential_fairness_terms
+from .gliding import CurveFeet as CurveFeet
 from .gliding import gliding_terms as gliding_terms
 from .handles import handle_terms as handle_terms
 from .normal_variation import normal_variation_terms as normal_variation_terms

@@ -12,7 +12,7 @@ from ..projection import ElementTerm
 from ..projection.layout import State
 from .barrier import barrier
 
-Feet = Callable[[State], tuple[Tensor, Tensor]]
+Feet = Callable[[State], tuple[Tensor, Tensor]]  # closest points (V, 3) and unit normals (V, 3)
 
 
 class TangentPlanes:
@@ -50,15 +50,16 @@ def plane_distance(x: Tensor, foot: Tensor, normal: Tensor) -> Tensor:
     return torch.dot(normal, x[0] - foot)
 
 
-def closeness_terms(planes: TangentPlanes, count: int, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
-    """Distance of every vertex from the reference surface, in the unit of the vertices."""
-    stencil = [(block, _each(count, planes))]
-    return [ElementTerm("closeness", plane_distance, stencil, weight=weight, refresh=planes)]
+def closeness_terms(planes: Feet, vertices: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
+    """Distance of ``vertices`` (n,) from the reference surface, in their unit; ``planes`` are those of all vertices."""
+
+    def refresh(state: State) -> tuple[Tensor, ...]:
+        return tuple(part[vertices] for part in planes(state))
+
+    return [ElementTerm("closeness", plane_distance, [(block, vertices[:, None])], weight=weight, refresh=refresh)]
 
 
-def distance_limit_terms(
-    planes: TangentPlanes, limits: Tensor, *, weight: float, block: str = "vertices"
-) -> list[ElementTerm]:
+def distance_limit_terms(planes: Feet, limits: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
     """Barrier that no vertex crosses: ``limits`` (V,) are the largest distances allowed; silent below half of it."""
 
     def limit(x: Tensor, foot: Tensor, normal: Tensor, most: Tensor) -> Tensor:
@@ -67,10 +68,5 @@ def distance_limit_terms(
     def refresh(state: State) -> tuple[Tensor, Tensor, Tensor]:
         return (*planes(state), limits)
 
-    return [
-        ElementTerm("distance limit", limit, [(block, _each(limits.shape[0], planes))], weight=weight, refresh=refresh)
-    ]
-
-
-def _each(count: int, planes: TangentPlanes) -> Tensor:
-    return torch.arange(count)[:, None]
+    every = torch.arange(limits.shape[0])[:, None]
+    return [ElementTerm("distance limit", limit, [(block, every)], weight=weight, refresh=refresh)]

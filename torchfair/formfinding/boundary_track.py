@@ -12,8 +12,6 @@ from ..errors import MeshError
 from ..subdivision import Refinement
 from ..topology import Topology
 
-_POLYLINE = 8  # points of the polyline that stands for a curve, per boundary edge
-
 
 class BoundaryTrack:
     """Every boundary loop lies on a closed curve; every boundary vertex has a parameter on it.
@@ -97,23 +95,8 @@ class BoundaryTrack:
         parameters[new_boundary_vertices(refinement)] = torch.remainder(start + 0.5 * there, 1.0)
         return BoundaryTrack(refinement.topology, self.curves, parameters, refinement.carry_vertex_labels(self.corners))
 
-    def polylines(self) -> tuple[list[Tensor], list[bool]]:
-        """The curves as open polylines between corners, or closed ones, for gliding; see :meth:`pieces`."""
-        lines, closed = [], []
-        for number, curve in enumerate(self.curves):
-            count = _POLYLINE * int((self.curve_numbers == number).sum())
-            stops = curve.corners.tolist()
-            if not stops:
-                lines.append(curve.at(torch.arange(count, dtype=torch.float64) / count))
-                closed.append(True)
-                continue
-            for a, b in zip(stops, [*stops[1:], stops[0] + 1.0], strict=True):
-                lines.append(curve.at(torch.linspace(a, b, max(2, round(count * (b - a))), dtype=torch.float64)))
-                closed.append(False)
-        return lines, closed
-
-    def pieces(self, vertices: Tensor) -> Tensor:
-        """(n,) number in :meth:`polylines` of the piece that boundary ``vertices`` (n,) lie on."""
+    def spans(self, vertices: Tensor) -> Tensor:
+        """(n,) number of the span that boundary ``vertices`` (n,) lie on, among those of all curves in a row."""
         first, result = 0, torch.zeros_like(vertices)
         for number, curve in enumerate(self.curves):
             mine = self.curve_numbers[vertices] == number

@@ -9,19 +9,19 @@ import torch
 from torch import Tensor
 
 from .. import constraints as c
-from ..boundary import boundary_corners, boundary_pieces
+from ..boundary import boundary_corners
 from ..constraints.closeness import TangentPlanes
 from ..constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
-from ..energies import normal_variation
-from ..errors import MeshError
-from ..geometry import corner_angles, face_areas, face_normals
-from ..geometry.closest_curve_point import ReferenceCurves
+from ..geometry import corner_angles, face_areas
 from ..geometry.closest_point import ReferenceSurface
 from ..geometry.planarity import planarity
 from ..projection import ElementTerm
 from ..projection.layout import State
 from ..topology import Topology
 from .checks import refuse_degenerate_faces
+from .fair_guard import FairGuard
+from .gliding_boundary import GlidingBoundary
+from .planar_faces import faces_to_keep_planar
 from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)
@@ -60,9 +60,9 @@ class FairProblem:
         self.targets = torch.stack(list(targets.values())) if targets else torch.zeros(0, 3, dtype=vertices.dtype)
         self.design_mode = self._leaves_reference()
         self.corners = boundary_corners(vertices, topology, settings.corner_angle)
-        self.corners[self.handles] = False
         self.fixed = {"vertices": self._fixed_vertices()[:, None].expand(-1, 3).clone()}
-        self.planar_faces = self._choose_planar_faces()
+        self.planar_faces = self._planar_faces()
+        self.boundary = self._gliding_boundary()
         self._common = [
             *self._closeness(),
             *self._boundary(),
@@ -136,22 +136,9 @@ class FairProblem:
         fixed[self.handles] = False
         return fixed
 
-    def _choose_planar_faces(self) -> Tensor:
-        polygons = self.topology.face_sizes > 3
-        chosen = self.settings.planar
-        if not isinstance(chosen, str):
-            faces = torch.tensor(chosen, dtype=torch.int64)
-            if faces.numel() and not bool(((faces >= 0) & (faces < self.topology.num_faces)).all()):
-                raise MeshError(
-                    f"planar: face numbers run from 0 to {self.topology.num_faces - 1}, got {list(chosen)[:5]}"
-                )
-            return faces
-        if chosen == "keep":
-            polygons = polygons & (planarity(self.vertices, self.topology) < self.settings.planar_tolerance)
-        elif chosen == "none":
-            polygons = torch.zeros_like(polygons)
-        faces = torch.nonzero(polygons).squeeze(1)
-        if faces.numel():
+    def _planar_faces(self) -> Tensor:
+        faces = faces_to_keep_planar(self.vertices, self.topology, self.settings)
+        if faces.numel() and isinstance(self.settings.planar, str):
             self.notes.append(f"{faces.numel()} of {self.topology.num_faces} faces are kept planar")
         return faces
 
@@ -175,41 +162,52 @@ class FairProblem:
         if self.design_mode:
             return []
         used = self.topology.valences > 0
-        terms = c.closeness_terms(self._planes, self.topology.num_vertices, weight=self.settings.closeness_weight)
+        close = used if self.boundary is None else used & ~self.boundary.held
+        chosen = torch.nonzero(close).squeeze(1)
+        terms = c.closeness_terms(self._planes, chosen, weight=self.settings.closeness_weight)
         if self.settings.distance_limit is not None:
-            distances = self.reference.closest(self.vertices).distances
+            distances = self.distances(self.vertices)
             limits = distances.clamp_min(self.settings.distance_limit) * (1.0 + 1e-9)  # rounding at the start
             far = int((distances > self.settings.distance_limit)[used].sum())
             if far:
                 self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")
-            terms += c.distance_limit_terms(self._planes, limits, weight=self.settings.quality_weight)
+            terms += c.distance_limit_terms(self._nearest, limits, weight=self.settings.quality_weight)
         return terms
 
-    def _boundary(self) -> list[ElementTerm]:
+    def _nearest(self, state: State) -> tuple[Tensor, Tensor]:
+        """Planes from which distances are measured: of gliding vertices from the surface or from their curve."""
+        planes = self._planes(state)
+        return planes if self.boundary is None else self.boundary.nearest(state, *planes)
+
+    def distances(self, vertices: Tensor) -> Tensor:
+        """(V,) distances from the reference surface or, where a vertex glides on a curve that is nearer, from that."""
+        positions, _ = self._nearest({"vertices": vertices})
+        distances: Tensor = torch.linalg.vector_norm(vertices - positions, dim=1)
+        return distances
+
+    def boundary_distances(self, vertices: Tensor) -> Tensor:
+        """(n,) distances of gliding vertices from their curves."""
+        feet = self.boundary.feet if self.boundary is not None else None
+        return vertices.new_zeros(0) if feet is None else feet({"vertices": vertices}).distances
+
+    def _gliding_boundary(self) -> GlidingBoundary | None:
         if self.settings.boundary != "glide":
+            return None
+        planar = torch.zeros_like(self.corners)
+        planar[self.topology.corners[torch.isin(self.topology.corner_faces, self.planar_faces)]] = True
+        return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles, planar)
+
+    def _boundary(self) -> list[ElementTerm]:
+        if self.boundary is None or self.boundary.feet is None:
             return []
-        vertices, owners, curves, closed = [], [], [], []
-        for number, piece in enumerate(boundary_pieces(self.topology, self.corners)):
-            gliding = piece.vertices[~self.corners[piece.vertices]]
-            gliding = gliding[~torch.isin(gliding, self.handles)]
-            vertices.append(gliding)
-            owners.append(torch.full_like(gliding, number))
-            curves.append(self.vertices[piece.vertices])
-            closed.append(piece.closed)
-        if not curves:
-            return []
-        terms = c.gliding_terms(
-            ReferenceCurves(curves, closed),
-            torch.cat(vertices),
-            torch.cat(owners),
-            weight=self.settings.boundary_weight,
-        )
-        return terms + c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight)
+        return [
+            *c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight),
+            *c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight),
+        ]
 
     def _quality(self) -> list[ElementTerm]:
         settings = self.settings
-        angles = corner_angles(self.vertices, self.topology)
-        smallest = min(settings.smallest_angle, float(angles.min()) * (1.0 - 1e-9))
+        angles, smallest = corner_angles(self.vertices, self.topology), self._smallest_angle
         safe = angles.clamp(max=max(_SAFE_ANGLE, 2.0 * smallest)).clamp_min(smallest + _LEAST_SAFETY)
         weight = settings.quality_weight
         return [
@@ -219,27 +217,34 @@ class FairProblem:
             ),
         ]
 
+    @cached_property
+    def _smallest_angle(self) -> float:
+        """Radians that no corner angle falls below."""
+        smallest = float(corner_angles(self.vertices, self.topology).min())
+        return min(self.settings.smallest_angle, smallest * (1.0 - 1e-9))
+
     # ---- guards ----------------------------------------------------------------------------------------
 
+    def placed(self, state: State) -> Tensor:
+        """The vertices (V, 3) of the mesh of a state: gliding ones are put on their curves."""
+        return state["vertices"] if self.boundary is None else self.boundary.placed(state)
+
     def admits(self, state: State, trial: State) -> bool:
-        """Whether a step may be taken: no face turns over, and E does not rise above that of the start.
+        """Whether a step may be taken: no face turns over, bounds hold, and E does not rise above that of the start.
 
         E may rise where handles, another reference or planarity ask for a different shape.
         """
-        if not self.keeps_faces(state, trial):
-            return False
-        return self._other_goals or float(normal_variation(trial["vertices"], self.topology)) <= self._start_energy
+        guard = self._guard
+        kept = guard.keeps_faces(state, trial) and guard.keeps_bounds(trial)
+        return kept and (self._other_goals or guard.keeps_energy(trial))
 
     @cached_property
-    def _start_energy(self) -> float:
-        return float(normal_variation(self.vertices, self.topology))
-
-    @cached_property
-    def _normals(self) -> Tensor:
-        return face_normals(self.vertices, self.topology)
-
-    def keeps_faces(self, state: State, trial: State) -> bool:
-        """Whether no face turns over: against the start, or in design mode against the last state."""
-        before = face_normals(state["vertices"], self.topology) if self.design_mode else self._normals
-        after = face_normals(trial["vertices"], self.topology)
-        return bool(((before * after).sum(1) > 0.0).all())
+    def _guard(self) -> FairGuard:
+        return FairGuard(
+            self.vertices,
+            self.topology,
+            self.placed,
+            smallest_angle=self._smallest_angle,
+            smallest_area=self.settings.smallest_area,
+            from_last=self.design_mode,
+        )

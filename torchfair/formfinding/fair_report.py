@@ -26,13 +26,15 @@ def fair_measures(
     Returns:
         ``normal_variation``, ``angle_variation``, ``total_mean_curvature`` (length unit of the input);
         ``mean_edge_length``; ``largest_distance`` from the reference surface and ``largest_distance_relative``
-        (in mean edges of the input); ``smallest_angle_degrees``; ``smallest_area_ratio`` and ``flipped_faces``
-        against the start; ``largest_planarity`` of the faces kept planar (diagonal distance over mean edge
-        of the face); ``largest_handle_distance``.
+        (in mean edges of the input), for vertices that glide on a boundary curve from the nearer of both;
+        ``largest_boundary_distance`` of gliding vertices from their curve; ``smallest_angle_degrees``;
+        ``smallest_area_ratio`` and ``flipped_faces`` against the start; ``largest_planarity`` of the faces kept planar
+        (diagonal distance over mean edge of the face); ``largest_handle_distance``.
     """
-    distances = problem.reference.closest(normalisation.apply(vertices)).distances[topology.valences > 0]
+    distances = problem.distances(normalisation.apply(vertices))[topology.valences > 0]
     ratios = face_areas(vertices, topology) / face_areas(start, topology)
     turned = (face_normals(vertices, topology) * face_normals(start, topology)).sum(1)
+    strayed = problem.boundary_distances(normalisation.apply(vertices))
     planar = planarity(vertices, topology)[problem.planar_faces]
     pulled = normalisation.invert(problem.targets) - vertices[problem.handles]
     return {
@@ -42,6 +44,7 @@ def fair_measures(
         "mean_edge_length": float(Normalisation.of(vertices, topology).length),
         "largest_distance": normalisation.length * float(distances.max()),
         "largest_distance_relative": float(distances.max()),
+        "largest_boundary_distance": normalisation.length * float(strayed.max()) if strayed.numel() else 0.0,
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
         "smallest_area_ratio": float(ratios.min()),
         "flipped_faces": int((turned <= 0.0).sum()),

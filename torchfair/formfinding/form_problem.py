@@ -13,7 +13,7 @@ from .._graph import graph_laplacian
 from ..constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks, lifted_absolute_curvature_terms
 from ..energies import total_absolute_curvature
 from ..geometry import corner_angles, vertex_normals
-from ..geometry.closest_curve_point import ReferenceCurves
+from ..geometry.spline_curves import SplineCurves
 from ..normalisation import Normalisation
 from ..projection import ElementTerm
 from ..topology import Topology
@@ -207,14 +207,14 @@ class FormProblem:
         return c.tangent_plane_terms(self.topology, chosen, targets[chosen], weight=weight)
 
     def _gliding(self, track: BoundaryTrack, normalisation: Normalisation) -> list[ElementTerm]:
-        lines, closed = track.polylines()
-        if not lines:
+        spans = [span for curve in track.curves for span in curve.spans()]
+        if not spans:
             return []
         vertices = torch.nonzero(self.topology.is_boundary_vertex & ~track.corners).squeeze(1)
-        curves = ReferenceCurves([normalisation.apply(line) for line in lines], closed)
+        curves = SplineCurves([normalisation.apply(span.points) for span in spans], [span.closed for span in spans])
         settings = self.settings
         return [
-            *c.gliding_terms(curves, vertices, track.pieces(vertices), weight=settings.boundary_weight),
+            *c.gliding_terms(c.CurveFeet(curves, vertices, track.spans(vertices)), weight=settings.boundary_weight),
             *c.boundary_fairness_terms(self.topology, track.corners, weight=settings.fairness_weight),
         ]
 

@@ -95,7 +95,7 @@ def minimise_normal_variation(
     )
 
     def observe(state: State) -> dict[str, float]:
-        return {"normal_variation": normalisation.length * float(normal_variation(state["vertices"], topology))}
+        return {"normal_variation": normalisation.length * float(normal_variation(problem.placed(state), topology))}
 
     runs: list[ProjectionResult] = []
     shares = problem.shares()
@@ -113,9 +113,9 @@ def minimise_normal_variation(
         runs.append(run)
         if run.status in (Status.INTERRUPTED, Status.CALLBACK):
             break
-        if not shares and share < _LARGEST_SHARE and not problem.is_planar(run.blocks["vertices"]):
+        if not shares and share < _LARGEST_SHARE and not problem.is_planar(problem.placed(run.blocks)):
             shares.append(share + _SHARE_STEP)
-    state = runs[-1].blocks["vertices"]
+    state = problem.placed(runs[-1].blocks)
     moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(state))
     after = fair_measures(moved, start, topology, problem, normalisation)
     if after["largest_handle_distance"] > _HANDLE_REACHED * normalisation.length:

@@ -142,8 +142,8 @@ class SymmetricProblem:
     def _closeness(self) -> list[ElementTerm]:
         if self._planes is None:
             return []
-        count = self.topology.num_vertices
-        return c.closeness_terms(self._planes, count, weight=self.settings.closeness_weight)
+        every = torch.arange(self.topology.num_vertices)
+        return c.closeness_terms(self._planes, every, weight=self.settings.closeness_weight)
 
     def _energy(self) -> list[ElementTerm]:
         settings = self.settings

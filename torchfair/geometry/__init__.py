@@ -30,6 +30,8 @@ from .polylines import second_differences as second_differences
 from .principal_curvatures import principal_directions as principal_directions
 from .principal_curvatures import principal_values as principal_values
 from .shape_operator import shape_operators as shape_operators
+from .spline_curves import SplineCurves as SplineCurves
+from .spline_curves import SplineFeet as SplineFeet
 from .star_normals import star_normals as star_normals
 from .tangent_basis import tangent_bases as tangent_bases
 from .tangential_shape_operator import tangential_shape_operators as tangential_shape_operators

@@ -25,12 +25,16 @@ class BoxTree:
 
     Args:
         low, high: (d, T) corners of the box of every item, T > 0.
+
+    Attributes:
+        items: (2^depth,) the item at each leaf; boxes of leaves without one are infinitely far from everything.
+        depth: number of the level of leaves.
     """
 
     def __init__(self, low: Floats, high: Floats) -> None:
-        self._items, empty = _median_order(low + high)
+        self.items, empty = _median_order(low + high)
         # With the upper corner negated one minimum merges both corners; no point is near an empty box.
-        boxes = np.concatenate([low, -high])[:, self._items]
+        boxes = np.concatenate([low, -high])[:, self.items]
         boxes[:, empty] = np.inf
         levels = [boxes]
         while levels[-1].shape[1] > 1:
@@ -39,20 +43,24 @@ class BoxTree:
         self._levels = [np.concatenate([level[:half], -level[half:]]) for level in reversed(levels)]
 
     @property
-    def _depth(self) -> int:
+    def depth(self) -> int:
         return len(self._levels) - 1
+
+    def level(self, depth: int) -> Floats:
+        """(2 d, 2^depth) low and high corners of the boxes of a level."""
+        return self._levels[depth]
 
     def guess(self, points: Floats) -> Ints:
         """An item near each of the points (d, N), not always the nearest."""
-        level = min(_TOP, self._depth)
+        level = min(_TOP, self.depth)
         node = _squared_gaps(self._levels[level][:, :, None], points[:, None]).argmin(0)
-        while level < self._depth:
-            step = min(_GUESS_STEP, self._depth - level)
+        while level < self.depth:
+            step = min(_GUESS_STEP, self.depth - level)
             level += step
             children = (node << step) + np.arange(1 << step)[:, None]
             nearest = _squared_gaps(self._levels[level].take(children, axis=1), points[:, None]).argmin(0)
             node = (node << step) + nearest
-        items: Ints = self._items.take(node)
+        items: Ints = self.items.take(node)
         return items
 
     def pairs(self, points: Floats, radius: Floats, limit: int) -> tuple[Ints, Ints] | None:
@@ -67,11 +75,11 @@ class BoxTree:
             Numbers of points (M,), ascending, and of items (M,); None if there are more than ``limit``.
         """
         squared = radius * radius
-        level = min(_TOP, self._depth)
+        level = min(_TOP, self.depth)
         gaps = _squared_gaps(self._levels[level][:, None], points[:, :, None])
         point, node = np.nonzero(gaps <= squared[:, None])
-        while level < self._depth:
-            step = min(_STEP, self._depth - level)
+        while level < self.depth:
+            step = min(_STEP, self.depth - level)
             if point.size << step > limit and squared.size > 1:
                 return None
             level += step
@@ -80,7 +88,7 @@ class BoxTree:
             boxes = self._levels[level].take(node, axis=1)
             near = np.flatnonzero(_squared_gaps(boxes, points.take(point, axis=1)) <= squared.take(point))
             point, node = point.take(near), node.take(near)
-        return point, self._items.take(node)
+        return point, self.items.take(node)
 
 
 def _squared_gaps(boxes: Floats, points: Floats) -> Floats:

@@ -7,11 +7,11 @@ import numpy as np
 from ._closest_boxes import BoxTree, Floats, Ints
 from ._closest_triangles import TINY, dot
 
-_APART = 1e90  # farther apart than any two points in space, and its square is in range
+APART = 1e90  # farther apart than any two points in space, and its square is in range
 
 
 class Segments:
-    """Segments in space with a fourth coordinate, ``_APART`` times the number of the curve they belong to.
+    """Segments in space with a fourth coordinate, ``APART`` times the number of the curve they belong to.
 
     A point with the fourth coordinate of its own curve is nearer to every segment of that curve than to any
     box with segments of another one, so the tree serves all curves at once. Distances are measured in space.
@@ -22,7 +22,7 @@ class Segments:
     """
 
     def __init__(self, starts: Floats, ends: Floats, curves: Ints) -> None:
-        level = _APART * curves[None]
+        level = APART * curves[None]
         boxes = np.concatenate([np.minimum(starts, ends), level]), np.concatenate([np.maximum(starts, ends), level])
         self.tree = BoxTree(*boxes)
         self._starts, self._ends, self._edges = starts, ends, ends - starts
@@ -35,7 +35,7 @@ class Segments:
 
     def place(self, points: Floats, curves: Ints) -> Floats:
         """Points (3, N) with the fourth coordinate of their curves (N,)."""
-        return np.concatenate([points, _APART * curves[None]])
+        return np.concatenate([points, APART * curves[None]])
 
     def guess(self, points: Floats) -> Ints:
         """A segment of their own curve not far from the points (4, N)."""

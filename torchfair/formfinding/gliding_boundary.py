@@ -1,0 +1,70 @@
+"""The boundary of a mesh that glides on smooth curves through its own vertices."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from ..boundary import boundary_pieces
+from ..constraints.gliding import CurveFeet
+from ..geometry.spline_curves import SplineCurves
+from ..projection.layout import State
+from ..topology import Topology
+
+
+class GlidingBoundary:
+    """Smooth curves through the boundary vertices of a mesh, with its corners, and the vertices that glide on them.
+
+    Corners and handles do not glide. In the mesh of a state gliding vertices are put on their curves exactly; a term
+    that weighs their distance leaves them beside, by a thousandth of an edge or less.
+
+    Args:
+        vertices: (V, 3) where the curves go through.
+        topology: Connectivity.
+        corners: (V,) bool, boundary vertices at which curves end.
+        handles: (n,) vertices that are pulled elsewhere.
+        loose: (V,) bool, vertices that the mesh of a state has where the state has them, for something else than the
+            curves holds them to a thousandth of an edge.
+
+    Attributes:
+        held: (V,) bool, vertices that glide and corners that stay: the curves hold them, not the surface.
+        feet: Closest points of gliding vertices on their curves; None where nothing glides.
+    """
+
+    def __init__(self, vertices: Tensor, topology: Topology, corners: Tensor, handles: Tensor, loose: Tensor) -> None:
+        pieces = boundary_pieces(topology, corners)
+        self.held = topology.is_boundary_vertex.clone()
+        self.held[handles] = False
+        chosen = torch.nonzero(self.held & ~corners).squeeze(1)
+        self._loose = loose[chosen, None]
+        self.feet: CurveFeet | None = None
+        if not chosen.numel():
+            return
+        curves = SplineCurves([vertices[piece.vertices] for piece in pieces], [piece.closed for piece in pieces])
+        owners = torch.full((topology.num_vertices,), -1)
+        for number, piece in enumerate(pieces):
+            owners[piece.vertices] = number  # corners belong to two, but do not glide
+        self.feet = CurveFeet(curves, chosen, owners[chosen])
+
+    def placed(self, state: State) -> Tensor:
+        """The vertices (V, 3) of a state with those that glide put on their curves."""
+        if self.feet is None:
+            return state["vertices"]
+        points, chosen = state[self.feet.block], self.feet.vertices
+        places = torch.where(self._loose, points[chosen], self.feet(state).positions)
+        return points.index_copy(0, chosen, places)
+
+    def nearest(self, state: State, positions: Tensor, normals: Tensor) -> tuple[Tensor, Tensor]:
+        """Closest points (V, 3) and unit normals (V, 3) of a surface, or those of curves where they are nearer.
+
+        As on the surface, the normal at a curve points to the vertex.
+        """
+        if self.feet is None:
+            return positions, normals
+        found, chosen = self.feet(state), self.feet.vertices
+        points = state[self.feet.block][chosen]
+        nearer = found.distances[:, None] < torch.linalg.vector_norm(points - positions[chosen], dim=1, keepdim=True)
+        away = (points - found.positions) / found.distances.clamp_min(1e-300)[:, None]
+        towards = torch.where(nearer & (found.distances[:, None] > 1e-9), away, normals[chosen])
+        places = torch.where(nearer, found.positions, positions[chosen])
+        return positions.index_copy(0, chosen, places), normals.index_copy(0, chosen, towards)
