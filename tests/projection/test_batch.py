@@ -91,7 +91,7 @@ def test_data_are_refreshed_for_each_member() -> None:
     terms = [
         *normal_variation_terms(topology, smoothing=0.1, block="x"),
         *interior_fairness_terms(topology, weight=0.1, block="x"),
-        *closeness_terms(planes, 30, weight=10.0, block="x"),
+        *closeness_terms(planes, torch.arange(30), weight=10.0, block="x"),
         ElementTerm("held", held, [("x", torch.arange(30)[:, None])], data=(vertices,), linear=True),
     ]
     noise = 0.1 * torch.randn(4, 30, 3, dtype=DOUBLE, generator=torch.Generator().manual_seed(1))

@@ -60,19 +60,21 @@ class Trials:
             again: The gain of the first attempt stays what counts.
 
         Returns:
-            The state after the step; None if the guard refuses it, or if it is not finite.
+            The state after the step, also where it is not taken; None if it is not finite.
         """
         trial, change, promised = self._finite(change)
         if trial is None:
             return None
-        merits, takes = trial.merits.tolist(), []
+        merits, gains, takes = trial.merits.tolist(), [], []
         for number, course in enumerate(self._state.courses):
             asked = self._active[number] and (to is None or to[number])
             fall = course.merit - merits[number]
-            gain = fall / promised[number] if promised[number] > 0.0 else -math.inf
-            if asked and not again:
-                self.gains[number] = max(self.gains[number], gain)
-            takes.append(asked and gain > LEAST_GAIN and fall > 0.0 and merits[number] < self.merits[number])
+            gains.append(fall / promised[number] if asked and promised[number] > 0.0 else -math.inf)
+            takes.append(gains[number] > LEAST_GAIN and fall > 0.0 and merits[number] < self.merits[number])
+        if any(takes) and not self._admits(trial.state):
+            return trial
+        if not again:
+            self.gains = [max(pair) for pair in zip(self.gains, gains, strict=True)]
         if all(takes):
             self._best, self._change, self._mixed, self.merits = trial, change, False, merits
         elif any(takes):
@@ -98,8 +100,6 @@ class Trials:
         """
         structure, shortened = self._problem.structure, False
         for _ in range(_HALVINGS):
-            if not self._admits(self._start + change):
-                return None, change, []
             trial = self._evaluate(self._start + change)
             if bool(torch.isfinite(trial.merits).all()):
                 fall = self._proposal.system.predicted_fall(change) if shortened else self._proposal.predicted
@@ -108,8 +108,7 @@ class Trials:
             change, shortened = torch.where(spoilt, 0.5 * change, change), True
         return None, change, []
 
-    def _admits(self, flat: Tensor) -> bool:
-        trial = self._problem.layout.unflatten(flat)
+    def _admits(self, trial: State) -> bool:
         return self._guard is None or self._guard(self._state.evaluation.state, trial)
 
     def _evaluate(self, flat: Tensor) -> Evaluation:
