@@ -16,7 +16,7 @@ FORMULATIONS = ("reduced", "lifted")
 
 def _default_projection() -> ProjectionSettings:
     return ProjectionSettings(
-        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=2e-3, patience=8
+        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=2e-3, patience=6
     )
 
 
@@ -83,4 +83,4 @@ class FairSettings:
     def stage(self) -> ProjectionSettings:
         """Settings of a stage before the last: fewer steps, wider tolerance."""
         most = min(20, self.projection.max_iterations)
-        return replace(self.projection, max_iterations=most, merit_tolerance=1e-2, patience=4)
+        return replace(self.projection, max_iterations=most, merit_tolerance=1e-2, patience=6)
