@@ -82,8 +82,8 @@ def test_places_on_the_curve_are_found_again(parameters: list[float], cornered: 
     s = torch.tensor(parameters, dtype=torch.float64)
     again = curve.parameters_of(curve.at(s))
     gap = torch.remainder(again - s + 0.5, 1.0) - 0.5
-    assert float(gap.abs().max()) < 1e-3
-    assert float((curve.at(again) - curve.at(s)).norm(dim=1).max()) < 1e-3 * curve.length
+    assert float(gap.abs().max()) < 1e-9
+    assert float((curve.at(again) - curve.at(s)).norm(dim=1).max()) < 1e-9 * curve.length
 
 
 def test_a_function_with_corners() -> None:
