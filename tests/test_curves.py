@@ -12,6 +12,7 @@ from torch import Tensor
 
 from torchfair.curves import ClosedCurve
 from torchfair.errors import MeshError, ShapeError
+from torchfair.geometry import SplineCurves
 
 TURN = 2.0 * math.pi
 
@@ -62,6 +63,30 @@ def test_corners_are_found_kept_and_sharp() -> None:
     places = curve.at(torch.linspace(0, 1, 81, dtype=torch.float64))
     on_side = torch.minimum((places[:, :2] - 0).abs(), (places[:, :2] - 2).abs()).amin(1)
     assert float(on_side.max()) < 1e-12
+
+
+def test_spans_are_the_splines_of_a_curve_in_order() -> None:
+    """From the first corner on, with corners at both ends; one closed span where there are none."""
+    curve = square(corners=[1, 3, 6])
+    spans = curve.spans()
+    assert [(len(span.points), span.closed) for span in spans] == [(3, False), (4, False), (4, False)]
+    points = torch.cat([span.points[:-1] for span in spans])
+    torch.testing.assert_close(points, curve.at(curve.knots).roll(-1, 0), rtol=0, atol=1e-14)
+    splines = SplineCurves([span.points for span in spans], [False] * 3)
+    places = curve.at(torch.linspace(0, 1, 200, dtype=torch.float64))
+    distances = torch.stack([splines.closest(places, torch.full((200,), k)).distances for k in range(3)]).amin(0)
+    assert float(distances.max()) < 1e-12
+    (whole,) = circle(9).spans()
+    assert whole.closed
+    torch.testing.assert_close(whole.points, circle(9).at(circle(9).knots), rtol=0, atol=1e-14)
+
+
+def test_places_beside_the_curve_have_the_parameters_of_their_feet() -> None:
+    """Also beyond a corner, and nearer to another span than to that of their neighbours."""
+    curve = square()
+    points = torch.tensor([[1.3, -0.2, 0.5], [-1, -1, 0], [1.2, 1.9, 0], [2.5, 0.4, 0]], dtype=torch.float64)
+    expected = torch.tensor([1.3 / 8, 0.0, 4.8 / 8, 2.4 / 8], dtype=torch.float64)
+    torch.testing.assert_close(curve.parameters_of(points), expected, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("count", [4, 7, 20, 33])
