@@ -76,9 +76,9 @@ def test_spans_are_the_splines_of_a_curve_in_order() -> None:
     places = curve.at(torch.linspace(0, 1, 200, dtype=torch.float64))
     distances = torch.stack([splines.closest(places, torch.full((200,), k)).distances for k in range(3)]).amin(0)
     assert float(distances.max()) < 1e-12
-    (whole,) = circle(9).spans()
+    (whole,) = circle(12).spans()
     assert whole.closed
-    torch.testing.assert_close(whole.points, circle(9).at(circle(9).knots), rtol=0, atol=1e-14)
+    torch.testing.assert_close(whole.points, circle(12).at(circle(12).knots), rtol=0, atol=1e-14)
 
 
 def test_places_beside_the_curve_have_the_parameters_of_their_feet() -> None:
