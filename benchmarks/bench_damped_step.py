@@ -39,8 +39,8 @@ from torch import Tensor
 from torus_problem import torus_problem
 
 import torchfair
+from torchfair.linear import ConjugateGradients, Factor, RslabDirect, ScipyDirect, Solution
 from torchfair.projection import GuidedProjection, IterationRecord, ProjectionSettings
-from torchfair.projection.linear import ConjugateGradients, LinearSolver, RslabDirect, ScipyDirect, Step
 from torchfair.projection.system import LinearSystem, Structure
 
 PARTS = ("jacobian", "assembly", "factor", "solve", "merit", "other", "whole")
@@ -95,39 +95,34 @@ class Clock:
         self.begin()
 
 
-class TimedDirect:
-    """A direct solver whose assembly, factorisation and substitution are timed."""
+class Timed:
+    """A linear solver whose assembly, factorisation and substitution are timed apart."""
 
-    inexact = False
+    def __init__(self, solver: RslabDirect | ScipyDirect | ConjugateGradients, clock: Clock) -> None:
+        self.name, self.inexact, self.prepare = solver.name, solver.inexact, solver.prepare
+        self._solver, self._clock = solver, clock
 
-    def __init__(self, solver: RslabDirect | ScipyDirect, clock: Clock) -> None:
-        self.name, self.prepare = solver.name, solver.prepare
-        self._solver = solver
-        self._assemble = clock.timed("assembly", solver.assemble)
-        self._factorise, self._clock = clock.timed("factor", solver.factorise), clock
-
-    def solve(self, system: LinearSystem, damping: Tensor, accuracy: float) -> Step:
-        """One damped step."""
-        substitute = self._factorise(self._assemble(system, damping), accuracy)
-        with self._clock.part("solve"):
-            change = torch.from_numpy(substitute(-system.gradient.numpy())).to(system.gradient)
-        return Step(change, torch.zeros_like(change))
-
-
-class TimedIterative(ConjugateGradients):
-    """Conjugate gradients whose assembly is timed apart."""
-
-    def __init__(self, clock: Clock) -> None:
-        super().__init__()
-        self._clock = clock
-
-    def solve(self, system: LinearSystem, damping: Tensor, accuracy: float) -> Step:
-        """One damped step."""
+    def factorise(self, system: LinearSystem, damping: Tensor) -> TimedFactor:
+        """The factor, with what it is made of computed before."""
         with self._clock.part("assembly"):
-            system.jacobian  # noqa: B018  (stored now, used by the solver)
-            system.diagonal_blocks  # noqa: B018
+            if self.inexact:
+                system.jacobian, system.diagonal_blocks  # noqa: B018  (stored now, used by the solver)
+            else:
+                system.lower_values  # noqa: B018
+        with self._clock.part("factor"):
+            return TimedFactor(self._solver.factorise(system, damping), self._clock)
+
+
+class TimedFactor:
+    """A factor whose solutions are timed."""
+
+    def __init__(self, factor: Factor, clock: Clock) -> None:
+        self._factor, self._clock = factor, clock
+
+    def solve(self, right: Tensor, accuracy: float) -> Solution:
+        """The solution."""
         with self._clock.part("solve"):
-            return super().solve(system, damping, accuracy)
+            return self._factor.solve(right, accuracy)
 
 
 class Case:
@@ -138,11 +133,7 @@ class Case:
         self.clock = Clock()
         self.runs: list[list[dict[str, Seconds]]] = []
         self.inner: list[int] = []
-        solver: LinearSolver = {
-            "rslab": lambda: TimedDirect(RslabDirect(), self.clock),
-            "scipy": lambda: TimedDirect(ScipyDirect(), self.clock),
-            "cg": lambda: TimedIterative(self.clock),
-        }[name]()
+        solver = Timed({"rslab": RslabDirect, "scipy": ScipyDirect, "cg": ConjugateGradients}[name](), self.clock)
         self.start, terms = torus_problem(size)
         begin = now()
         self.problem = GuidedProjection(self.start, terms, solver=solver)
@@ -164,7 +155,7 @@ class Case:
         if self.name == "cg":
             system.jacobian, system.diagonal_blocks  # noqa: B018
         else:
-            system.normal_values  # noqa: B018
+            system.lower_values  # noqa: B018
 
     def _time(self, structure: Structure) -> None:
         linearise = structure.linearise

@@ -33,8 +33,8 @@ from scipy.optimize import least_squares
 from torus_problem import SMOOTHING, torus_problem
 
 import torchfair
+from torchfair.linear import RslabDirect
 from torchfair.projection import GuidedProjection, ProjectionSettings
-from torchfair.projection.linear import RslabDirect
 from torchfair.projection.system import Evaluation
 
 TARGET = 0.5

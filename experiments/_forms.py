@@ -26,7 +26,7 @@ from torchfair.energies import normal_variation, total_absolute_curvature
 from torchfair.formfinding import FormResult, minimise_absolute_curvature
 from torchfair.geometry import corner_angles, face_areas, shape_operators, vertex_areas
 from torchfair.projection import ElementTerm, ProjectionSettings, SmoothAbsolute, guided_projection
-from torchfair.projection.normalisation import Normalisation
+from torchfair.normalisation import Normalisation
 from torchfair.subdivision import loop
 
 Mesh = tuple[Tensor, Topology]

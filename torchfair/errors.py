@@ -42,5 +42,9 @@ class MeshFileError(TorchfairError):
         self.line = line
 
 
+class SettingsError(TorchfairError):
+    """A setting that is not among those allowed."""
+
+
 class SingularSystemError(TorchfairError):
     """A linear solver met a matrix that is singular, indefinite or not finite."""

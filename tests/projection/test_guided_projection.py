@@ -9,6 +9,7 @@ from torch import Tensor
 
 from torchfair import ShapeError, Topology, TorchfairError
 from torchfair.errors import SingularSystemError
+from torchfair.linear import Factor, LowerTriangle, ScipyDirect, System
 from torchfair.projection import (
     ElementTerm,
     GuidedProjection,
@@ -18,7 +19,6 @@ from torchfair.projection import (
     Status,
     guided_projection,
 )
-from torchfair.projection.linear import ScipyDirect
 
 
 def stretched(x: Tensor, length: Tensor) -> Tensor:
@@ -210,10 +210,10 @@ class Reluctant(ScipyDirect):
     def __init__(self, needed: float) -> None:
         self.needed = needed
 
-    def solve(self, system: object, damping: Tensor, accuracy: float) -> object:
+    def factorise(self, system: System, damping: Tensor) -> Factor:
         if float(damping.max()) < self.needed:
             raise SingularSystemError("singular")
-        return super().solve(system, damping, accuracy)
+        return super().factorise(system, damping)
 
 
 def test_singular_system_raises_damping() -> None:
@@ -256,20 +256,31 @@ def test_residual_that_is_not_finite_at_the_start_is_an_error() -> None:
         guided_projection({"x": torch.tensor([[1.0], [-1.0]], dtype=DOUBLE)}, [term])
 
 
-def test_batch_equals_loop_and_shares_the_analysis() -> None:
+class Counting(ScipyDirect):
+    """Counts symbolic analyses, of its copies too."""
+
+    analyses = 0
+
+    def analyse(self, lower: LowerTriangle) -> None:
+        Counting.analyses += 1
+        super().analyse(lower)
+
+
+def test_starts_and_batches_share_the_analysis() -> None:
     vertices, topology = wavy_grid(triangles=True)
     batch = torch.stack([vertices, vertices + 0.1 * torch.sin(vertices), 1.2 * vertices])
-    problem = GuidedProjection({"vertices": vertices}, [length_term(topology)], solver="scipy")
-    calls = []
-    original = problem.solver.prepare
-    problem.solver.prepare = lambda structure: (calls.append(1), original(structure))
-    together = problem.solve_batch({"vertices": batch})
-    assert len(calls) == 1
-    for member, result in zip(batch, together, strict=True):
-        alone = guided_projection(
+    problem = GuidedProjection({"vertices": vertices}, [length_term(topology)], solver=Counting())
+    Counting.analyses = 0
+    alone = [problem.solve({"vertices": member}) for member in batch]
+    assert Counting.analyses == 1
+    together = problem.solve_batch({"vertices": batch}, settings=ProjectionSettings(max_iterations=2))
+    assert Counting.analyses == 2  # of all members at once
+    assert [result.iterations for result in together] == [2, 2, 2]
+    for member, result in zip(batch, alone, strict=True):
+        fresh = guided_projection(
             {"vertices": member}, [length_term(topology)], settings=ProjectionSettings(solver="scipy")
         )
-        assert torch.equal(alone.blocks["vertices"], result.blocks["vertices"])
+        assert torch.equal(fresh.blocks["vertices"], result.blocks["vertices"])
 
 
 def test_float32_states_are_solved_in_float32() -> None:

@@ -9,9 +9,8 @@ import torch
 from helpers import wavy_grid
 from torch import Tensor
 
+from torchfair.linear import ConjugateGradients, Factor, Solution, System
 from torchfair.projection import ElementTerm, ProjectionSettings, Status, guided_projection
-from torchfair.projection.linear import ConjugateGradients, Step
-from torchfair.projection.system import LinearSystem
 
 
 def stretched(x: Tensor) -> Tensor:
@@ -40,9 +39,17 @@ class Listening(ConjugateGradients):
         super().__init__()
         self.asked: list[float] = []
 
-    def solve(self, system: LinearSystem, damping: Tensor, accuracy: float) -> Step:
+    def factorise(self, system: System, damping: Tensor) -> ListeningFactor:
+        return ListeningFactor(super().factorise(system, damping), self.asked)
+
+
+class ListeningFactor:
+    def __init__(self, factor: Factor, asked: list[float]) -> None:
+        self.factor, self.asked = factor, asked
+
+    def solve(self, right: Tensor, accuracy: float = 0.0) -> Solution:
         self.asked.append(accuracy)
-        return super().solve(system, damping, accuracy)
+        return self.factor.solve(right, accuracy)
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-8, 1e-12])

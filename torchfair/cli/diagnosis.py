@@ -60,7 +60,7 @@ class Diagnosis:
 
 def diagnose_mesh(vertices: Tensor, topology: Topology) -> Diagnosis:
     """Judges all stars of one mesh ``(V, 3)``."""
-    from ..projection.threads import threads_for
+    from .._threads import threads_for
 
     # Stars are judged in small chunks: waking a second thread for each operation costs more than it saves.
     with threads_for(0, vertices.device):

@@ -59,7 +59,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Checks what can be checked first, then reads, renders, writes and prints."""
-    from ..projection.threads import threads_for
+    from .._threads import threads_for
 
     files = _files(arguments)
     if arguments.size < _LEAST_SIZE:

@@ -11,9 +11,8 @@ from torch import Tensor
 from ..curves import ClosedCurve
 from ..energies import total_absolute_curvature
 from ..errors import MeshError, ShapeError
-from ..projection import ProjectionResult
-from ..projection.iteration import Callback
-from ..projection.normalisation import Normalisation
+from ..normalisation import Normalisation
+from ..projection import Callback, ProjectionResult
 from ..subdivision import Refinement, catmull_clark, loop
 from ..topology import Topology
 from ..triangulation import triangulate

@@ -11,7 +11,7 @@ from torch import Tensor
 from ..energies import angle_variation, normal_variation, total_mean_curvature
 from ..geometry import corner_angles, face_areas, face_normals
 from ..geometry.planarity import planarity
-from ..projection.normalisation import Normalisation
+from ..normalisation import Normalisation
 from ..topology import Topology
 
 if TYPE_CHECKING:

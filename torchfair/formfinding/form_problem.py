@@ -14,8 +14,8 @@ from ..constraints.lifted_absolute_curvature import lifted_absolute_curvature_bl
 from ..energies import total_absolute_curvature
 from ..geometry import corner_angles, vertex_normals
 from ..geometry.spline_curves import SplineCurves
+from ..normalisation import Normalisation
 from ..projection import ElementTerm
-from ..projection.normalisation import Normalisation
 from ..topology import Topology
 from .boundary_track import BoundaryTrack
 from .form_settings import FormSettings

@@ -8,8 +8,7 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from ..projection import ElementTerm, GuidedProjection, ProjectionResult, ProjectionSettings, Status
-from ..projection.iteration import Callback
+from ..projection import Callback, ElementTerm, GuidedProjection, ProjectionResult, ProjectionSettings, Status
 from ..projection.layout import State
 from .face_guard import FaceGuard
 from .form_problem import FormProblem

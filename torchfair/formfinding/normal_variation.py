@@ -9,10 +9,9 @@ import torch
 from torch import Tensor
 
 from ..energies import normal_variation
-from ..projection import ProjectionResult, Status, guided_projection
-from ..projection.iteration import Callback
+from ..normalisation import Normalisation
+from ..projection import Callback, ProjectionResult, Status, guided_projection
 from ..projection.layout import State
-from ..projection.normalisation import Normalisation
 from ..topology import Topology
 from .checks import one_start
 from .fair_problem import FairProblem

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from ..principal import PrincipalEdges
-from ..projection import ProjectionResult
-from ..projection.iteration import Callback
+from ..projection import Callback, ProjectionResult
 from ..topology import Topology
 from .handles import read_handles
 from .symmetric_design import SymmetricDesign

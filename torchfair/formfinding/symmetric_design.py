@@ -7,16 +7,15 @@ from collections.abc import Mapping, Sequence
 import torch
 from torch import Tensor
 
+from .._threads import threads_for
 from ..boundary import boundary_corners
 from ..constraints import BoundaryNormals
 from ..errors import MeshError
 from ..geometry.closest_point import ReferenceSurface
+from ..normalisation import Normalisation
 from ..principal import PrincipalEdges
 from ..principal.principal_edges import PrincipalStars
-from ..projection import ProjectionResult
-from ..projection.iteration import Callback
-from ..projection.normalisation import Normalisation
-from ..projection.threads import threads_for
+from ..projection import Callback, ProjectionResult
 from ..subdivision import Refinement, interpolate_vertices, loop, near
 from ..subdivision.interpolation import BOUNDARY_CORNER
 from ..topology import Topology

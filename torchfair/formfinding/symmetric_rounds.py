@@ -10,8 +10,7 @@ from torch import Tensor
 
 from ..constraints.saddle_sides import beyond_tangent_plane, is_negative
 from ..principal import PrincipalEdges
-from ..projection import ProjectionResult, ProjectionSettings, Status
-from ..projection.iteration import Callback
+from ..projection import Callback, ProjectionResult, ProjectionSettings, Status
 from ..projection.layout import State
 from ..stars import pyramid_self_intersections
 from .symmetric_problem import Aim, SymmetricProblem

@@ -13,5 +13,10 @@ from .result import IterationRecord as IterationRecord
 from .result import ProjectionResult as ProjectionResult
 from .result import Status as Status
 from .result import TermResidual as TermResidual
+from .run import Callback as Callback
 from .settings import ProjectionSettings as ProjectionSettings
+from .state import ProjectionState as ProjectionState
+from .steps import finished as finished
+from .steps import init as init
+from .steps import step as step
 from .term import ElementTerm as ElementTerm

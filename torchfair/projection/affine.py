@@ -10,9 +10,9 @@ import scipy.sparse as sp
 import torch
 from torch import Tensor
 
+from ..linear.sparse import csr_matrix
 from .compiled import CompiledTerm
 from .layout import Layout, State
-from .sparse import csr_matrix
 
 _TOLERANCE = 1e-3
 
@@ -65,6 +65,15 @@ class AffinePart:
     def residual(self, flat: Tensor) -> Tensor:
         """(rows,) scaled residuals; half the sum of their squares is the merit of the linear terms."""
         return self.change(flat).add_(self.offset)
+
+    def member_sums(self, rows: Tensor, members: int) -> Tensor:
+        """(members,) sums of (rows,) values over the rows of each member of a batch."""
+        return torch.stack([part.view(members, -1).sum(1) for part in torch.split(rows, self._sizes)]).sum(0)
+
+    def member_owners(self, members: int) -> Tensor:
+        """(rows,) number of the member that a row belongs to."""
+        every = torch.arange(members, device=self.offset.device)
+        return torch.cat([every.repeat_interleave(size // members) for size in self._sizes])
 
     def change(self, step: Tensor) -> Tensor:
         """(rows,) by how much a step (N,) changes the scaled residuals."""

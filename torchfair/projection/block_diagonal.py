@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from ..linear.sparse import csr_matrix
 from .affine import AffinePart
 from .compiled import CompiledTerm
 from .layout import Layout
 from .products import ProductSum
-from .sparse import csr_matrix
 
 
 class BlockDiagonal:

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 LARGEST = 1e16
 SMALLEST = 1e-16
 
 
-@dataclass
+@dataclass(frozen=True)
 class Damping:
-    """Falls smoothly after steps that did what the model said, rises ever faster after rejected ones."""
+    """Falls smoothly after steps that did what the model said, rises ever faster after rejected ones.
+
+    Attributes:
+        value: The parameter.
+        growth: Factor of the next rise.
+    """
 
     value: float
-    _growth: float = 2.0
+    growth: float = 2.0
 
-    def accept(self, gain: float) -> None:
+    def accepted(self, gain: float) -> Damping:
         """After an accepted step whose actual over predicted decrease is ``gain``."""
-        self.value = max(self.value * max(1.0 / 3.0, 1.0 - (2.0 * min(gain, 1.0) - 1.0) ** 3), SMALLEST)
-        self._growth = 2.0
+        return Damping(max(self.value * max(1.0 / 3.0, 1.0 - (2.0 * min(gain, 1.0) - 1.0) ** 3), SMALLEST))
 
-    def reject(self) -> bool:
-        """After a rejected step or a singular system; False when there is no larger value to try."""
-        self.value *= self._growth
-        self._growth *= 2.0
-        return self.value <= LARGEST
+    def rejected(self) -> Damping:
+        """After a rejected step or a singular system."""
+        return replace(self, value=self.value * self.growth, growth=2.0 * self.growth)
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether there is no larger value to try."""
+        return self.value > LARGEST

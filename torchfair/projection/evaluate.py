@@ -22,13 +22,19 @@ def residual_table(structure: Structure, terms: Sequence[ElementTerm], at: Evalu
         terms: All its terms, also those without elements or weight.
         at: A state whose residuals are known.
     """
+    return residual_tables(structure, terms, at)[0]
+
+
+def residual_tables(structure: Structure, terms: Sequence[ElementTerm], at: Evaluation) -> list[list[TermResidual]]:
+    """The tables of all members of a batch, see :func:`residual_table`."""
     known = {id(c.term): (a, v) for c, a, v in zip(structure.compiled, at.arguments, at.values, strict=True)}
     groups: dict[str, list[ElementTerm]] = {}
     for term in terms:
         groups.setdefault(term.name, []).append(term)
-    rows = []
+    count = structure.layout.members
+    tables: list[list[TermResidual]] = [[] for _ in range(count)]
     for name, members in groups.items():
-        norms, share = [torch.zeros(0, dtype=torch.float64)], 0.0
+        norms, share = [torch.zeros(count, 0, dtype=torch.float64)], torch.zeros(count, dtype=torch.float64)
         for term in members:
             if not term.num_elements:
                 continue
@@ -37,12 +43,14 @@ def residual_table(structure: Structure, terms: Sequence[ElementTerm], at: Evalu
             else:
                 arguments = term.arguments(at.state)
                 values = term.values(arguments)
-            norms.append(torch.linalg.vector_norm(term.missed(values), dim=1).double().cpu())
-            share += float(term.contributions(arguments, values).sum())
-        norm = torch.cat(norms)
-        mean, largest = (float(norm.mean()), float(norm.max())) if norm.numel() else (0.0, 0.0)
-        rows.append(TermResidual(name, members[0].weight, norm.numel(), mean, largest, share))
-    return rows
+            norms.append(torch.linalg.vector_norm(term.missed(values), dim=1).double().cpu().view(count, -1))
+            share += term.contributions(arguments, values).double().cpu().view(count, -1).sum(1)
+        norm = torch.cat(norms, 1)
+        empty = torch.zeros(count).tolist()
+        mean, largest = (norm.mean(1).tolist(), norm.amax(1).tolist()) if norm.numel() else (empty, empty)
+        for table, *row in zip(tables, mean, largest, share.tolist(), strict=True):
+            table.append(TermResidual(name, members[0].weight, norm.shape[1], *row))
+    return tables
 
 
 def first_bad_elements(term: ElementTerm, state: State) -> list[int]:
@@ -59,7 +67,7 @@ def check_start(structure: Structure, start: Evaluation) -> None:
         bad = torch.nonzero(~torch.isfinite(block).all(1)).squeeze(1).tolist()
         if bad:
             raise TorchfairError(f"block '{name}' is not finite in rows {bad[:5]}: repair the start")
-    if start.merit != float("inf"):
+    if bool(torch.isfinite(start.merits).all()):
         affine = structure.affine
         misfit = affine.misfit(state, structure.layout.flatten(state)) if affine is not None else None
         if misfit is not None:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor
 
+from .._threads import threads_for
 from ..errors import ShapeError
-from .iteration import Callback, Guard, Iteration, Observe
-from .layout import Layout, State
-from .linear import LinearSolver, choose_solver
-from .linear.direct import SparseDirect
+from .batch import BatchRun
+from .layout import State
+from .problem import Problem
 from .result import ProjectionResult
+from .run import Callback, Observe, Run
 from .settings import ProjectionSettings
-from .system import Structure
 from .term import ElementTerm
-from .threads import threads_for
+from .trials import Guard
 
 
 def guided_projection(
@@ -41,7 +40,8 @@ def guided_projection(
         terms: What is to be small. See :class:`ElementTerm`.
         fixed: Masks ``(n,)`` or ``(n, d)`` by block name, True where an unknown stays as it is.
         settings: Tolerances, damping, linear solver.
-        callback: Called with every :class:`IterationRecord`; returning True stops the iteration.
+        callback: Called with every :class:`IterationRecord`, which then also holds the state; returning True stops
+            the iteration.
         observe: Named quantities of a state to keep in the history.
         guard: ``guard(state, trial)`` refuses a trial state by returning False; the step then counts as
             one that does not lower the merit.
@@ -58,7 +58,7 @@ def guided_projection(
     return problem.solve(blocks, settings=settings, callback=callback, observe=observe, guard=guard)
 
 
-class GuidedProjection:
+class GuidedProjection(Problem):
     """Terms compiled for blocks of given sizes; solves from many starts with one symbolic analysis.
 
     Args:
@@ -66,46 +66,6 @@ class GuidedProjection:
         terms, fixed: See :func:`guided_projection`.
         solver: Name of a linear solver, or an object with that protocol.
     """
-
-    def __init__(
-        self,
-        blocks: State,
-        terms: Sequence[ElementTerm],
-        *,
-        fixed: Mapping[str, Tensor] | None = None,
-        solver: str | LinearSolver = "auto",
-    ) -> None:
-        if not blocks or not terms:
-            raise ShapeError("guided projection", "at least one block and one term", f"{len(blocks)} and {len(terms)}")
-        first = next(iter(blocks.values()))
-        for name, block in blocks.items():
-            if block.dtype != first.dtype or block.device != first.device:
-                raise ShapeError(
-                    f"block '{name}'", f"{first.dtype} on {first.device}", f"{block.dtype} on {block.device}"
-                )
-        self.terms = list(terms)
-        self.layout = Layout.of(blocks)
-        free = self.layout.free_mask(fixed or {}, first.device)
-        self.structure = Structure(self.layout, self.terms, free, first.dtype)
-        self.solver = choose_solver(solver, self.structure) if isinstance(solver, str) else solver
-        self._prepared = False
-
-    def with_terms(self, terms: Sequence[ElementTerm]) -> GuidedProjection:
-        """The same problem with other data, weights and losses of its terms; index maps and analysis are kept.
-
-        Args:
-            terms: On the same stencils as those before, in the same order.
-
-        Raises:
-            ShapeError: stencils differ, or other terms have elements and a weight.
-        """
-        result = copy.copy(self)
-        result.terms = list(terms)
-        result.structure = self.structure.with_terms(terms)
-        kept = isinstance(self.solver, SparseDirect) and result.structure.shares_pattern(self.structure)
-        result._prepared = self._prepared and kept
-        result.solver = self.solver if kept else copy.copy(self.solver)
-        return result
 
     def solve(
         self,
@@ -116,24 +76,35 @@ class GuidedProjection:
         observe: Observe | None = None,
         guard: Guard | None = None,
     ) -> ProjectionResult:
-        """Iterates from ``blocks``; see :func:`guided_projection`. The linear solver is that of the constructor."""
-        if Layout.of(blocks) != self.layout:
-            raise ShapeError("blocks", str(self.layout.sizes), str(Layout.of(blocks).sizes))
-        with torch.no_grad(), threads_for(self.layout.num_unknowns, self.structure.free.device):
-            run = Iteration(self, blocks, settings or ProjectionSettings(), callback, observe, guard)
-            return run.run()
+        """Iterates from ``blocks``; see :func:`guided_projection`.
+
+        The linear solver is that of the constructor, unless the settings name another one, which is then kept for the
+        next time.
+        """
+        settings = settings or ProjectionSettings()
+        problem = self.solved_by(settings.solver)
+        with torch.no_grad(), threads_for(self.layout.num_unknowns, self.structure.device):
+            return Run(problem, blocks, settings, callback, observe, guard).result()
 
     def solve_batch(self, blocks: State, *, settings: ProjectionSettings | None = None) -> list[ProjectionResult]:
-        """Iterates from every member of blocks ``(batch, n, d)``, one result each."""
+        """Iterates from every member of blocks ``(batch, n, d)`` at once, one result each.
+
+        The members share terms and fixed unknowns. They are solved as one system with their block structure, which is
+        many times as fast as one after the other where they are small. Damping, acceptance and convergence are those of
+        each member, so results are the same up to rounding; only a singular system raises the damping of all.
+
+        Raises:
+            ShapeError: blocks are not ``(batch, n, d)`` of the sizes compiled for.
+            TorchfairError: see :func:`guided_projection`.
+        """
+        settings = settings or ProjectionSettings()
         counts = {block.shape[0] for block in blocks.values()}
         if len(counts) != 1 or any(block.ndim != 3 for block in blocks.values()):
             shapes = [tuple(block.shape) for block in blocks.values()]
             raise ShapeError("blocks", "(batch, n, d) with one batch size", shapes)
-        members = [{name: block[i] for name, block in blocks.items()} for i in range(counts.pop())]
-        return [self.solve(member, settings=settings) for member in members]
-
-    def prepare(self) -> None:
-        """Symbolic analysis, once."""
-        if not self._prepared:
-            self.solver.prepare(self.structure)
-            self._prepared = True
+        if counts == {0}:
+            return []
+        self.check_blocks({name: block[0] for name, block in blocks.items()})
+        size = self.layout.num_unknowns * counts.pop()
+        with torch.no_grad(), threads_for(size, self.structure.device):
+            return BatchRun(self.solved_by(settings.solver), blocks, settings).results()

@@ -2,43 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
-from .linear.base import Step
-from .loss import OneSided
-from .system import LinearSystem
-
-Solve = Callable[[LinearSystem], Step]
+from ..linear import LinearSolver
+from .loss import is_one_sided
+from .proposal import Proposal
+from .system import LinearSystem, Structure
 
 _MOST_SOLVES = 6
 _ENOUGH = 0.1  # of the fall of the model: cost of inequalities wrongly heeded or ignored that is worth a solve
 _WHOLE = 0.9  # of a change that is all but gone to its end
 _HALVINGS = 40
-
-
-class Proposal(NamedTuple):
-    """A step to be tried.
-
-    Attributes:
-        change: (N,) zero at fixed unknowns.
-        predicted: By how much the merit of the linearised residuals falls.
-        iterations: Of the linear solver, over all systems solved.
-    """
-
-    change: Tensor
-    predicted: float
-    iterations: int
-
-    @classmethod
-    def of(cls, system: LinearSystem, step: Step, damping: Tensor) -> Proposal:
-        """From the solution of one damped system."""
-        change = step.change * system.structure.free
-        predicted = 0.5 * float(change @ (damping * change - system.gradient + step.remainder))
-        return cls(change, predicted, step.iterations)
 
 
 class Inequalities:
@@ -54,117 +31,161 @@ class Inequalities:
 
     def __init__(self, whole: LinearSystem, numbers: list[int]) -> None:
         self._whole, self._numbers = whole, numbers
-        equations = [r for number, r in enumerate(whole.residuals) if number not in numbers]
-        if whole.affine_residual is not None:
-            equations.append(whole.affine_residual)
-        inequalities = [whole.residuals[number] for number in numbers]
-        self._equations, self._inequalities = (_flat(part, inequalities[0]) for part in (equations, inequalities))
+        self._equations, self._inequalities = self._split(whole.residuals, whole.affine_residual)
+        self._rows = _Members(whole.structure, numbers, whole)
         self.broken = self._inequalities > 0.0
 
     @classmethod
     def of(cls, whole: LinearSystem) -> Inequalities | None:
         """None if no term is one-sided."""
         terms = [compiled.term for compiled in whole.structure.compiled]
-        numbers = [number for number, term in enumerate(terms) if isinstance(term.loss, OneSided)]
+        numbers = [number for number, term in enumerate(terms) if is_one_sided(term.loss)]
         return cls(whole, numbers) if numbers else None
 
     def heeding(self, heeded: Tensor) -> LinearSystem:
         """The system that takes inequalities (n,) bool for equations and leaves the others out."""
-        jacobians, residuals, start = list(self._whole.jacobians), list(self._whole.residuals), 0
+        whole, start = self._whole, 0
+        jacobians, residuals = list(whole.jacobians), list(whole.residuals)
         for number in self._numbers:
             values = residuals[number]
             chosen = heeded[start : start + values.numel()].view(values.shape)
             start += values.numel()
             residuals[number] = values * chosen
             jacobians[number] = jacobians[number] * chosen[:, None]
-        return LinearSystem(self._whole.structure, jacobians, residuals, self._whole.affine_residual)
+        return LinearSystem(whole.structure, jacobians, residuals, whole.roots, whole.affine_residual)
 
-    def propose(self, solve: Solve, damping: Tensor, likely: Tensor | None) -> tuple[Proposal, Tensor]:
+    def chosen_members(self, heeded: Tensor, chosen: list[int]) -> Tensor:
+        """(n',) the inequalities heeded of some of the members of a batch alone."""
+        return heeded[self._rows.are_among(chosen)]
+
+    def propose(self, solver: LinearSolver, damping: Tensor, likely: Tensor | None, accuracy: float) -> Proposal:
         """The step that minimises the merit of linearised residuals, plus damping.
 
         That is a convex, piecewise quadratic function. Newton's method for it asks after every linear solve which
         inequalities the solution breaks, and goes as far towards the solution as the function falls. It stops at the
-        minimum, or near it.
+        minimum, or near it; in a batch every member for itself.
 
         Args:
-            solve: Solves a system with damping.
+            solver: Linear solver, prepared for the systems of this structure.
             damping: (N,) diagonal.
             likely: (n,) inequalities that are likely to be heeded, such as those of the step before.
-
-        Returns:
-            The step, and (n,) bool the inequalities that it heeds.
+            accuracy: Relative remainder of linear solutions that is good enough.
         """
-        free = self._whole.structure.free
-        start = at = _Point(torch.zeros_like(damping), self._equations, self._inequalities, damping)
+        structure, rows = self._whole.structure, self._rows
+        start = at = _Point(torch.zeros_like(damping), self._equations, self._inequalities, damping, rows)
         heeded = self.broken if likely is None else self.broken | likely
-        iterations = 0
+        iterations, going = 0, torch.ones(structure.layout.members, dtype=torch.bool, device=damping.device)
         for _ in range(_MOST_SOLVES):
-            step = solve(self.heeding(heeded))
-            iterations += step.iterations
-            at, whole = at.lowest_along(*self._along(step.change * free - at.change))
+            system = self.heeding(heeded)
+            factor = solver.factorise(system, damping)
+            solution = factor.solve(-system.gradient, accuracy)
+            iterations += solution.iterations
+            change = (solution.values * structure.free - at.change) * structure.layout.member_spread(going)
+            at, length = at.lowest_along(change, *self._split(*self._whole.changes(change)))
             broken = at.inequalities > 0.0
             missed = torch.where(broken != heeded, at.inequalities, 0.0)
             heeded = broken
-            if whole and 0.5 * float(missed @ missed) <= _ENOUGH * (start.damped - at.damped):
+            cost = 0.5 * rows.sums_of_inequalities(missed.square())
+            going = going & ~((length > _WHOLE) & (cost <= _ENOUGH * (start.damped - at.damped)))
+            if not bool(going.any()):
                 break
-        return Proposal(at.change, start.merit - at.merit, iterations), heeded
+        return Proposal(at.change, start.merit - at.merit, iterations, system, factor, damping, heeded)
 
-    def _along(self, change: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """A step (N,) and the changes of equations and inequalities that come with it, by the linear model."""
-        structure = self._whole.structure
-        equations: list[Tensor] = []
-        inequalities: list[Tensor] = []
-        for number, (compiled, jacobian) in enumerate(zip(structure.compiled, self._whole.jacobians, strict=True)):
-            changes = torch.einsum("mkn,kn->mn", jacobian, change[compiled.unknowns])
-            (inequalities if number in self._numbers else equations).append(changes)
-        if structure.affine is not None:
-            equations.append(structure.affine.change(change))
-        return change, _flat(equations, change), _flat(inequalities, change)
+    def _split(self, terms: list[Tensor], affine: Tensor | None) -> tuple[Tensor, Tensor]:
+        """Equations and inequalities apart, each as one vector."""
+        equations = [part for number, part in enumerate(terms) if number not in self._numbers]
+        inequalities = [terms[number] for number in self._numbers]
+        return _flat([*equations, *([] if affine is None else [affine])], inequalities[0]), _flat(inequalities)
 
 
-class _Point(NamedTuple):
+class _Members:
+    """To which member of a batch equations and inequalities belong."""
+
+    def __init__(self, structure: Structure, numbers: list[int], system: LinearSystem) -> None:
+        self._layout, self._count = structure.layout, structure.layout.members
+        if self._count > 1:
+            every = torch.arange(self._count, device=structure.device)
+            owners = [every.repeat_interleave(r.shape[1] // self._count).expand_as(r) for r in system.residuals]
+            affine = [] if structure.affine is None else [structure.affine.member_owners(self._count)]
+            equations = [owner for number, owner in enumerate(owners) if number not in numbers]
+            self._equations = _flat([*equations, *affine], every)
+            self._inequalities = _flat([owners[number] for number in numbers])
+
+    def are_among(self, chosen: list[int]) -> Tensor:
+        """(n,) bool: inequalities of the chosen members."""
+        return torch.isin(self._inequalities, torch.tensor(chosen, device=self._inequalities.device))
+
+    def sums(self, unknowns: Tensor, equations: Tensor, inequalities: Tensor) -> Tensor:
+        """(members,) sums over all three."""
+        total = self._layout.member_sums(unknowns) + self.sums_of_inequalities(inequalities)
+        if self._count == 1:
+            return total + equations.sum()
+        return total.index_add(0, self._equations, equations)
+
+    def sums_of_inequalities(self, values: Tensor) -> Tensor:
+        """(members,) sums over inequalities."""
+        if self._count == 1:
+            return values.sum()[None]
+        return values.new_zeros(self._count).index_add_(0, self._inequalities, values)
+
+    def spread(self, values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Values (members,) for unknowns, equations and inequalities."""
+        if self._count == 1:
+            return values, values, values
+        return self._layout.member_spread(values), values[self._equations], values[self._inequalities]
+
+
+@dataclass(frozen=True)
+class _Point:
     """A step with the residuals after it."""
 
     change: Tensor
     equations: Tensor
     inequalities: Tensor
     damping: Tensor
+    rows: _Members
 
     @property
-    def merit(self) -> float:
-        """Merit of the linearised residuals."""
+    def merit(self) -> Tensor:
+        """(members,) merits of the linearised residuals."""
         broken = self.inequalities.clamp_min(0.0)
-        return 0.5 * float(self.equations @ self.equations + broken @ broken)
+        return 0.5 * self.rows.sums(torch.zeros_like(self.change), self.equations.square(), broken.square())
 
     @property
-    def damped(self) -> float:
+    def damped(self) -> Tensor:
         """The same plus damping: what a step minimises."""
-        return self.merit + 0.5 * float(self.change @ (self.damping * self.change))
+        broken = self.inequalities.clamp_min(0.0)
+        return 0.5 * self.rows.sums(self.damping * self.change.square(), self.equations.square(), broken.square())
 
-    def lowest_along(self, change: Tensor, equations: Tensor, inequalities: Tensor) -> tuple[_Point, bool]:
-        """Where :attr:`damped` is lowest along a change, with the changes of residuals given; whether near its end."""
+    def lowest_along(self, change: Tensor, equations: Tensor, inequalities: Tensor) -> tuple[_Point, Tensor]:
+        """Where :attr:`damped` is lowest along a change with these changes of residuals; and how far (members,)."""
         damped = self.damping * change
-        slope = float(equations @ self.equations + damped @ self.change)
-        curvature = float(equations @ equations + damped @ change)
+        nothing = torch.zeros_like(inequalities)
+        slope = self.rows.sums(damped * self.change, equations * self.equations, nothing)
+        curvature = self.rows.sums(damped * change, equations.square(), nothing)
 
-        def rises(length: float) -> bool:
-            broken = (self.inequalities + length * inequalities).clamp_min(0.0)
-            return slope + length * curvature + float(broken @ inequalities) > 0.0
+        def rises(length: Tensor) -> Tensor:
+            broken = (self.inequalities + self.rows.spread(length)[2] * inequalities).clamp_min(0.0)
+            return slope + length * curvature + self.rows.sums_of_inequalities(broken * inequalities) > 0.0
 
-        length = 1.0
-        if rises(1.0):
-            length, beyond = 0.0, 1.0
+        beyond = torch.ones_like(slope)
+        too_far = rises(beyond)
+        length = torch.where(too_far, 0.0, beyond)
+        if bool(too_far.any()):
             for _ in range(_HALVINGS):
                 middle = 0.5 * (length + beyond)
-                length, beyond = (length, middle) if rises(middle) else (middle, beyond)
-        lowest = _Point(
-            self.change + length * change,
-            self.equations + length * equations,
-            self.inequalities + length * inequalities,
-            self.damping,
+                falls = ~rises(middle)
+                length, beyond = torch.where(falls, middle, length), torch.where(falls, beyond, middle)
+        along, along_equations, along_inequalities = self.rows.spread(length)
+        lowest = replace(
+            self,
+            change=self.change + along * change,
+            equations=self.equations + along_equations * equations,
+            inequalities=self.inequalities + along_inequalities * inequalities,
         )
-        return lowest, length > _WHOLE
+        return lowest, length
 
 
-def _flat(parts: list[Tensor], like: Tensor) -> Tensor:
-    return torch.cat([like.new_zeros(0), *(part.reshape(-1) for part in parts)])
+def _flat(parts: list[Tensor], like: Tensor | None = None) -> Tensor:
+    start = [] if like is None else [like.new_zeros(0)]
+    return torch.cat([*start, *(part.reshape(-1) for part in parts)])

@@ -17,13 +17,17 @@ State = Mapping[str, Tensor]
 class Layout:
     """How blocks ``name -> (n, d)`` lie in one flat vector: block after block, node after node.
 
-    A *node* is one row of a block, for example a vertex with its three coordinates.
+    A *node* is one row of a block, for example a vertex with its three coordinates. Several *members* of a batch, which
+    share no element, may lie in one layout: the rows of every block are then those of the first member, of the second,
+    and so on.
 
     Attributes:
-        sizes: ``(n, d)`` of every block, in order.
+        sizes: ``(n, d)`` of every block, in order, all members together.
+        members: How many there are.
     """
 
     sizes: dict[str, tuple[int, int]]
+    members: int = 1
 
     @classmethod
     def of(cls, state: State) -> Layout:
@@ -63,6 +67,29 @@ class Layout:
         """One vector as blocks (views)."""
         parts = torch.split(flat, [n * d for n, d in self.sizes.values()])
         return {name: part.view(n, d) for (name, (n, d)), part in zip(self.sizes.items(), parts, strict=True)}
+
+    def member_sums(self, flat: Tensor) -> Tensor:
+        """(members,) sums of a flat vector over the unknowns of each member."""
+        return torch.stack([part.sum(1) for part in self._by_member(flat)]).sum(0)
+
+    def member_largest(self, flat: Tensor) -> Tensor:
+        """(members,) largest entries."""
+        return torch.stack([part.amax(1) for part in self._by_member(flat) if part.shape[1]]).amax(0)
+
+    def member_spread(self, values: Tensor) -> Tensor:
+        """(N,) the value (members,) of the member that an unknown belongs to."""
+        if self.members == 1:
+            return values.expand(self.num_unknowns)
+        parts = [values.repeat_interleave(n * d // self.members) for n, d in self.sizes.values()]
+        return torch.cat(parts)
+
+    def chosen_members(self, flat: Tensor, chosen: list[int]) -> Tensor:
+        """The flat vector of some of the members alone."""
+        return torch.cat([part[chosen].reshape(-1) for part in self._by_member(flat)])
+
+    def _by_member(self, flat: Tensor) -> list[Tensor]:
+        parts = torch.split(flat, [n * d for n, d in self.sizes.values()])
+        return [part.view(self.members, -1) for part in parts if part.numel()]
 
     def free_mask(self, fixed: Mapping[str, Tensor], device: torch.device) -> Tensor:
         """True where an unknown may move; the masks ``(n,)`` or ``(n, d)`` in ``fixed`` are True where it may not."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import torch
 from torch import Tensor
@@ -27,6 +27,11 @@ class Loss(Protocol):
             (n,) numbers, or matrices (n, m, m) where components are weighted differently.
         """
         ...
+
+
+def is_one_sided(loss: Loss) -> bool:
+    """Whether components below zero cost nothing: the loss has a true attribute ``one_sided``."""
+    return bool(getattr(loss, "one_sided", False))
 
 
 @dataclass(frozen=True)
@@ -70,6 +75,8 @@ class OneSided:
     The model of a damped step knows about components below zero too, so that a step does not break what holds where it
     starts: see "How the solver decides" in the documentation.
     """
+
+    one_sided: ClassVar[bool] = True
 
     def value(self, residuals: Tensor) -> Tensor:
         """Half the squared norm of the components above zero."""

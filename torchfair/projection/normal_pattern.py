@@ -5,13 +5,13 @@ from __future__ import annotations
 import copy
 import itertools
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 import torch
 from torch import Tensor
 
+from ..linear import LowerTriangle
 from .affine import AffinePart
 from .compiled import CompiledTerm
 from .layout import Layout
@@ -28,8 +28,7 @@ class NormalPattern:
     an element are summed into place by one fixed sparse matrix; linear terms are added as a constant.
 
     Attributes:
-        offsets: (N+1,) start of each column.
-        rows: (nnz,) row of each entry.
+        lower: Places of the entries.
     """
 
     def __init__(self, layout: Layout, terms: Sequence[CompiledTerm], affine: AffinePart | None, like: Tensor) -> None:
@@ -46,7 +45,7 @@ class NormalPattern:
             found = [self._product_places(n, t.widths) for n, t in zip(nodes, terms, strict=True)]
             places, factors = zip(*found, strict=True)
             firsts = [[0] * sum(term.widths) for term in terms]
-            self._products = ProductSum(firsts, places, factors, self.rows.size, like)
+            self._products = ProductSum(firsts, places, factors, self.lower.rows.size, like)
         if affine is not None and constant is not None:
             self._constant = self._place_constant(constant).to(like)
 
@@ -79,15 +78,16 @@ class NormalPattern:
         before = np.cumsum(row_widths) - row_widths
         self._start = base[columns] + before - before[self._pair_offsets[:-1]][columns]
         self._stride = (below - 1)[columns]
-        self.rows = np.empty(base[-1], np.int64)
-        self.offsets = np.empty(self.num_unknowns + 1, np.int64)
-        self.offsets[-1] = base[-1]
+        all_rows = np.empty(base[-1], np.int64)
+        offsets = np.empty(self.num_unknowns + 1, np.int64)
+        offsets[-1] = base[-1]
         for j in range(int(widths.max(initial=0))):
             nodes = np.flatnonzero(widths > j)
-            self.offsets[self._first[nodes] + j] = base[nodes] + j * below[nodes] - (j * (j - 1)) // 2
+            offsets[self._first[nodes] + j] = base[nodes] + j * below[nodes] - (j * (j - 1)) // 2
             for i in range(int(widths.max())):
                 pairs = np.flatnonzero((widths[columns] > j) & (row_widths > i) & ((rows != columns) | (i >= j)))
-                self.rows[_place(self._start[pairs], self._stride[pairs], i, j)] = self._first[rows[pairs]] + i
+                all_rows[_place(self._start[pairs], self._stride[pairs], i, j)] = self._first[rows[pairs]] + i
+        self.lower = LowerTriangle(offsets, all_rows)
 
     def _product_places(self, nodes: Ints, widths: list[int]) -> tuple[Tensor, Tensor | None]:
         """Places ``(pairs, n)`` of the products of local unknowns p >= q, and their factors.
@@ -127,7 +127,7 @@ class NormalPattern:
         owner = np.repeat(np.arange(self._widths.size), self._widths)
         rows, columns = owner[lower.row], owner[lower.col]
         pairs = self._find(rows, columns)
-        values = np.zeros(self.rows.size)
+        values = np.zeros(self.lower.rows.size)
         i, j = lower.row - self._first[rows], lower.col - self._first[columns]
         values[_place(self._start[pairs], self._stride[pairs], i, j)] = lower.data
         return torch.from_numpy(values)
@@ -157,18 +157,8 @@ class NormalPattern:
 
     def assemble(self, jacobians: Sequence[Tensor]) -> Tensor:
         """(nnz,) values of the lower triangle for element Jacobians ``(m, K, n)`` of the terms."""
-        values = self._like.new_zeros(self.rows.size) if self._products is None else self._products(jacobians)
+        values = self._like.new_zeros(self.lower.rows.size) if self._products is None else self._products(jacobians)
         return values if self._constant is None else values.add_(self._constant)
-
-    @cached_property
-    def full(self) -> tuple[Ints, Ints, Ints]:
-        """Column offsets, rows and source positions of the full symmetric matrix in compressed columns."""
-        numbers = np.arange(1, self.rows.size + 1)
-        lower = sp.csc_matrix((numbers, self.rows, self.offsets), (self.num_unknowns, self.num_unknowns))
-        upper = sp.triu(lower.T, k=1, format="csc")
-        both = (lower + upper).tocsc()
-        both.sort_indices()
-        return both.indptr, both.indices, both.data - 1
 
 
 def _place(start: Ints, stride: Ints, i: Ints | int, j: Ints | int) -> Ints:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from .sparse import scatter_matrix
+from ..linear.sparse import scatter_matrix
 
 
 class ProductSum:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING
 
 from torch import Tensor
+
+if TYPE_CHECKING:
+    from .state import ProjectionState
 
 
 class Status(enum.Enum):
@@ -66,6 +70,8 @@ class IterationRecord:
         inner_iterations: Iterations of the linear solver; with inequalities, over all systems solved for the step.
         elapsed: Seconds since the start.
         quantities: What ``observe`` returned for the best state, for example energies.
+        timings: Seconds spent in ``linearise``, ``solve`` and ``merit``.
+        state: Where the run stands; only for callbacks, None in the history.
     """
 
     iteration: int
@@ -78,12 +84,13 @@ class IterationRecord:
     inner_iterations: int
     elapsed: float
     quantities: dict[str, float] = field(default_factory=dict)
+    timings: dict[str, float] = field(default_factory=dict, compare=False, repr=False)
+    state: ProjectionState | None = field(default=None, compare=False, repr=False)
 
     def as_dict(self) -> dict[str, object]:
         """For JSON; the quantities stand beside the other entries."""
-        row = asdict(self)
-        row.update(row.pop("quantities"))
-        return row
+        hidden = ("quantities", "timings", "state")
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in hidden} | self.quantities
 
 
 @dataclass(frozen=True)

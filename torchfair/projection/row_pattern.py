@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from ..linear.sparse import csr_matrix, group
 from .affine import AffinePart
 from .compiled import CompiledTerm
-from .sparse import csr_matrix, group
 
 
 class RowPattern:

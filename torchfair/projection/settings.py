@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from .linear.base import LinearSolver
+from ..linear import LinearSolver
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class ProjectionSettings:
         least_extrapolation: A step that gained more than predicted is tried again at the length at which a
             parabola through what was seen is smallest, if that is more than this many times longer;
             infinity never tries.
+        least_gain_uncorrected: A step that gained less than this is tried again with a second-order correction; minus
+            infinity never tries.
         time_limit: Seconds, or None.
         accuracy: Relative remainder with which an iterative linear solver starts; tightened as the merit
             settles.
@@ -39,6 +42,7 @@ class ProjectionSettings:
     merit_tolerance: float = 1e-9
     patience: int = 3
     least_extrapolation: float = 1.25
+    least_gain_uncorrected: float = -math.inf
     time_limit: float | None = None
     accuracy: float = 1e-2
     solver: str | LinearSolver = "auto"

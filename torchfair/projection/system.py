@@ -11,6 +11,9 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError
+from ..linear import LowerTriangle
+from ..linear.block_inverse import block_inverse
+from ..linear.sparse import scatter_matrix
 from .affine import AffinePart
 from .block_diagonal import BlockDiagonal
 from .compiled import CompiledTerm
@@ -18,7 +21,6 @@ from .layout import Layout, State
 from .loss import apply_root
 from .normal_pattern import NormalPattern
 from .row_pattern import RowPattern
-from .sparse import scatter_matrix
 from .term import ElementTerm
 
 
@@ -27,13 +29,14 @@ class Evaluation(NamedTuple):
 
     Attributes:
         state: The blocks.
-        merit: Sum of all terms; infinity where a residual is not finite, so that such a state is never accepted.
+        merits: (members,) sums of all terms, one for each member of a batch; infinity where a residual is not finite,
+            so that such a state is never accepted.
         arguments, values: Of each term of ``Structure.compiled``, unscaled.
         affine: Scaled residuals of the linear terms.
     """
 
     state: State
-    merit: float
+    merits: Tensor
     arguments: list[tuple[Tensor, ...]]
     values: list[Tensor]
     affine: Tensor | None
@@ -88,12 +91,22 @@ class Structure:
     def shares_pattern(self, other: Structure) -> bool:
         """Whether the normal matrices of both are filled in the same places; False unless known."""
         mine, theirs = (structure.__dict__.get("normal_pattern") for structure in (self, other))
-        return mine is not None and theirs is not None and mine.rows is theirs.rows
+        return mine is not None and theirs is not None and mine.lower is theirs.lower
 
     @property
     def num_unknowns(self) -> int:
         """Length of the flat vector."""
         return self.free.shape[0]
+
+    @property
+    def device(self) -> torch.device:
+        """Of the unknowns."""
+        return self.free.device
+
+    @property
+    def lower(self) -> LowerTriangle:
+        """Places of the lower triangle of the normal matrix."""
+        return self.normal_pattern.lower
 
     @cached_property
     def _scatter(self) -> Tensor:
@@ -107,6 +120,12 @@ class Structure:
             return self._like.clone()
         total: Tensor = self._scatter @ torch.cat([part.reshape(-1) for part in local])
         return total
+
+    def member_sums(self, local: Sequence[Tensor]) -> Tensor:
+        """(members,) sums of local values ``(m, n)`` of the terms that are not linear."""
+        members = self.layout.members
+        parts = [part.view(part.shape[0], members, -1).sum((0, 2)) for part in local]
+        return torch.stack([self._like.new_zeros(members), *parts]).sum(0)
 
     @cached_property
     def normal_pattern(self) -> NormalPattern:
@@ -127,28 +146,38 @@ class Structure:
 
     def evaluate(self, state: State) -> Evaluation:
         """Residuals and merit of a state."""
-        total, arguments, values = 0.0, [], []
+        arguments, values, parts = [], [], [self._like.new_zeros(self.layout.members)]
         for term in (compiled.term for compiled in self.compiled):
             arguments.append(term.arguments(state))
             values.append(term.values(arguments[-1]))
-            total += float(term.contributions(arguments[-1], values[-1]).sum())
+            contributions = term.contributions(arguments[-1], values[-1])
+            parts.append(contributions.view(self.layout.members, -1).sum(1).to(self._like))
         affine = None
         if self.affine is not None:
             affine = self.affine.residual(self.layout.flatten(state))
-            total += 0.5 * float(affine.square().sum())
-        merit = total if total == total and total != float("-inf") else float("inf")
-        return Evaluation(state, merit, arguments, values, affine)
+            parts.append(0.5 * self.affine.member_sums(affine.square(), self.layout.members))
+        merits = torch.stack(parts).sum(0)
+        merits = torch.where(torch.isfinite(merits), merits, torch.inf)
+        return Evaluation(state, merits, arguments, values, affine)
+
+    def unknowns_of_infinite_elements(self, at: Evaluation) -> Tensor:
+        """(N,) bool: unknowns of elements whose share of the merit is not finite."""
+        bad = []
+        for compiled, arguments, values in zip(self.compiled, at.arguments, at.values, strict=True):
+            infinite = ~torch.isfinite(compiled.term.contributions(arguments, values))
+            bad.append(infinite.to(self._like).expand_as(compiled.unknowns))
+        return self.scatter(bad) > 0.0
 
     def linearise(self, state: State | Evaluation) -> LinearSystem:
         """Residuals and Jacobians of all terms at a state, scaled by the square roots of their weights."""
         at = state if isinstance(state, Evaluation) else self.evaluate(state)
-        jacobians, residuals = [], []
+        jacobians, residuals, roots = [], [], []
         for compiled, free, arguments, values in zip(self.compiled, self._free, at.arguments, at.values, strict=True):
-            root = compiled.term.roots(values)
-            residuals.append(apply_root(root, values).T)
-            jacobian = _scaled(compiled.term.jacobians(arguments), root)
+            roots.append(compiled.term.roots(values))
+            residuals.append(apply_root(roots[-1], values).T)
+            jacobian = _scaled(compiled.term.jacobians(arguments), roots[-1])
             jacobians.append(jacobian if free is None else jacobian.mul_(free))
-        return LinearSystem(self, jacobians, residuals, at.affine)
+        return LinearSystem(self, jacobians, residuals, roots, at.affine)
 
 
 class LinearSystem:
@@ -159,23 +188,57 @@ class LinearSystem:
     Attributes:
         jacobians: for each term of ``Structure.compiled`` ``(m, K, n)``, unknowns as in ``CompiledTerm``.
         residuals: likewise ``(m, n)``.
+        roots: square roots of the weights that both are scaled by, see ``ElementTerm.roots``.
         affine_residual: of the linear terms.
     """
 
     def __init__(
-        self, structure: Structure, jacobians: list[Tensor], residuals: list[Tensor], affine_residual: Tensor | None
+        self,
+        structure: Structure,
+        jacobians: list[Tensor],
+        residuals: list[Tensor],
+        roots: list[Tensor],
+        affine_residual: Tensor | None,
     ) -> None:
         self.structure = structure
         self.jacobians = jacobians
         self.residuals = residuals
+        self.roots = roots
         self.affine_residual = affine_residual
 
     @cached_property
     def gradient(self) -> Tensor:
         """``J^T r``, the gradient of the merit."""
-        total = self.structure.scatter([_contract(j, r) for j, r in zip(self.jacobians, self.residuals, strict=True)])
-        if self.structure.affine is not None and self.affine_residual is not None:
-            total += self.structure.affine.gradient(self.affine_residual)
+        return self._pulled_back(self.residuals, self.affine_residual)
+
+    def gradient_with(self, other: Evaluation) -> Tensor:
+        """``J^T r`` with the residuals of another state, in the weights of this one."""
+        residuals = [apply_root(root, values).T for root, values in zip(self.roots, other.values, strict=True)]
+        return self._pulled_back(residuals, other.affine)
+
+    def _pulled_back(self, residuals: Sequence[Tensor], affine: Tensor | None) -> Tensor:
+        total = self.structure.scatter([_contract(j, r) for j, r in zip(self.jacobians, residuals, strict=True)])
+        if self.structure.affine is not None and affine is not None:
+            total += self.structure.affine.gradient(affine)
+        return total
+
+    def changes(self, step: Tensor) -> tuple[list[Tensor], Tensor | None]:
+        """By how much a step (N,) changes the residuals of the model: of each term (m, n), and of the linear terms."""
+        terms = [
+            torch.einsum("mkn,kn->mn", jacobian, step[compiled.unknowns])
+            for compiled, jacobian in zip(self.structure.compiled, self.jacobians, strict=True)
+        ]
+        return terms, None if self.structure.affine is None else self.structure.affine.change(step)
+
+    def predicted_fall(self, step: Tensor) -> Tensor:
+        """(members,) by how much the merit of the linearised residuals falls with a step (N,)."""
+        structure = self.structure
+        members = structure.layout.members
+        total = -structure.layout.member_sums(step * self.gradient)
+        terms, affine = self.changes(step)
+        total -= 0.5 * structure.member_sums([change.square() for change in terms])
+        if affine is not None and structure.affine is not None:
+            total -= 0.5 * structure.affine.member_sums(affine.square(), members)
         return total
 
     @cached_property
@@ -214,8 +277,31 @@ class LinearSystem:
         parts = [r.reshape(-1) for r in self.residuals]
         return torch.cat(parts if self.affine_residual is None else [*parts, self.affine_residual])
 
+    @property
+    def pattern(self) -> Structure:
+        """Where the normal matrix has entries."""
+        return self.structure
+
+    @property
+    def root(self) -> Tensor:
+        """``J``, the root of the normal matrix."""
+        return self.jacobian
+
+    def product(self, vectors: Tensor) -> Tensor:
+        """``J^T J`` times vectors (N,) or (N, k)."""
+        result: Tensor = self.jacobian_transpose @ (self.jacobian @ vectors)
+        return result
+
+    def preconditioner(self, damping: Tensor) -> Tensor:
+        """Inverse of the damped diagonal blocks, as a CSR matrix."""
+        parts = self.structure.layout.unflatten(damping)
+        inverses = [
+            block_inverse(block + torch.diag_embed(parts[name])) for name, block in self.diagonal_blocks.items()
+        ]
+        return self.structure.block_diagonal.matrix(torch.cat([inverse.reshape(-1) for inverse in inverses]))
+
     @cached_property
-    def normal_values(self) -> Tensor:
+    def lower_values(self) -> Tensor:
         """Values of the lower triangle of ``J^T J`` in the order of the normal pattern."""
         return self.structure.normal_pattern.assemble(self.jacobians)
 

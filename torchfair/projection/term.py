@@ -10,7 +10,7 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from .layout import Layout, State
-from .loss import Loss, OneSided, Squares, apply_root
+from .loss import Loss, Squares, apply_root, is_one_sided
 
 Residual = Callable[..., Tensor]
 Refresh = Callable[[State], Sequence[Tensor]]
@@ -90,7 +90,7 @@ class ElementTerm:
             raise ShapeError(f"{what}, weight", "a number of at least 0", self.weight)
         if self.linear and (self.refresh is not None or not isinstance(self.loss, Squares) or self.merit is not None):
             raise ShapeError(what, "a linear term with squares and without refresh or merit", "one of these")
-        if self.merit is not None and isinstance(self.loss, OneSided):
+        if self.merit is not None and is_one_sided(self.loss):
             raise ShapeError(what, "inequalities without a merit of their own", "one")
 
     def arguments(self, state: State) -> tuple[Tensor, ...]:
@@ -113,7 +113,7 @@ class ElementTerm:
 
     def missed(self, residuals: Tensor) -> Tensor:
         """Residuals ``(n, m)`` without what holds of inequalities."""
-        return residuals.clamp_min(0.0) if isinstance(self.loss, OneSided) else residuals
+        return residuals.clamp_min(0.0) if is_one_sided(self.loss) else residuals
 
     def contributions(self, arguments: tuple[Tensor, ...], residuals: Tensor) -> Tensor:
         """(n,) merit of every element."""

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import torch
 
-from ..system import Structure
-from .base import LinearSolver
+from ..errors import SettingsError
+from .base import LinearSolver, Pattern
 from .conjugate_gradients import ConjugateGradients
 from .dense import DenseQR
 from .rslab_direct import RslabDirect
@@ -18,17 +18,17 @@ _RSLAB_LIMIT = 200_000
 _SCIPY_LIMIT = 30_000
 
 
-def choose_solver(name: str, structure: Structure) -> LinearSolver:
+def choose_solver(name: str, pattern: Pattern) -> LinearSolver:
     """A solver by name, or the fastest that suits the size of the problem.
 
     Args:
         name: ``"auto"``, ``"dense"``, ``"scipy"``, ``"rslab"`` or ``"cg"``. ``auto`` takes dense for a few
-            unknowns, a sparse direct solver for middle sizes (rslab if installed) and conjugate gradients
+            unknowns, a sparse direct solver for middle sizes (rslab if it can be used) and conjugate gradients
             above that and on GPUs.
-        structure: The problem.
+        pattern: Of the matrices.
 
     Raises:
-        ValueError: unknown name, or rslab is asked for and not installed.
+        SettingsError: unknown name, or rslab is asked for and cannot be used.
     """
     makers: dict[str, Callable[[], LinearSolver]] = {
         "dense": DenseQR,
@@ -37,11 +37,14 @@ def choose_solver(name: str, structure: Structure) -> LinearSolver:
         "cg": ConjugateGradients,
     }
     if name == "auto":
-        name = _automatic(structure.num_unknowns, structure.free.device)
+        name = _automatic(pattern.num_unknowns, pattern.device)
     if name not in makers:
-        raise ValueError(f"unknown linear solver '{name}': choose auto, {', '.join(makers)}")
+        raise SettingsError(f"unknown linear solver '{name}': choose auto, {', '.join(makers)}")
     if name == "rslab" and not RslabDirect.available():
-        raise ValueError("linear solver 'rslab' is not installed: pip install 'torchfair[direct]', or choose 'scipy'")
+        raise SettingsError(
+            "linear solver 'rslab' cannot be used: it is not installed (pip install 'torchfair[direct]'), or torchfair "
+            "was not imported in the main thread; choose 'scipy' or 'auto'"
+        )
     return makers[name]()
 
 

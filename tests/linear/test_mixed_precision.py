@@ -7,8 +7,8 @@ import torch
 from torch import Tensor
 
 from torchfair.errors import SingularSystemError
+from torchfair.linear import RslabDirect
 from torchfair.projection import ElementTerm, GuidedProjection
-from torchfair.projection.linear import RslabDirect
 
 pytestmark = pytest.mark.skipif(not RslabDirect.available(), reason="rslab is an extra")
 LENGTH = 400
@@ -36,7 +36,7 @@ def relative_remainder(holding: float) -> tuple[float, RslabDirect]:
     damping = torch.full((LENGTH,), 1e-14, dtype=torch.float64)
     solver = RslabDirect()
     solver.prepare(problem.structure)
-    change = solver.solve(system, damping, 1e-2).change
+    change = solver.factorise(system, damping).solve(-system.gradient, 1e-2).values
     jacobian = system.jacobian.to_dense()
     left = jacobian.T @ (jacobian @ change) + damping * change + system.gradient
     return float(left.norm() / system.gradient.norm()), solver
@@ -62,4 +62,4 @@ def test_a_singular_matrix_is_refused_in_both_precisions() -> None:
     solver = RslabDirect()
     solver.prepare(problem.structure)
     with pytest.raises(SingularSystemError):
-        solver.solve(system, torch.full((LENGTH,), -100.0, dtype=torch.float64), 1e-2)
+        solver.factorise(system, torch.full((LENGTH,), -100.0, dtype=torch.float64))

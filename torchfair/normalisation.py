@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from ..errors import MeshError
-from ..geometry import edge_lengths
-from ..topology import Topology
+from .errors import MeshError
+from .geometry import edge_lengths
+from .topology import Topology
 
 
 @dataclass(frozen=True)

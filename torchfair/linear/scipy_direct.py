@@ -5,33 +5,32 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from ...errors import SingularSystemError
-from ..system import Structure
+from ..errors import SingularSystemError
 from .direct import SparseDirect, Substitution
+from .lower_triangle import LowerTriangle
 
 
 class ScipyDirect(SparseDirect):
     """``scipy.sparse.linalg.splu`` with minimum degree on ``A + A^T`` and diagonal pivots.
 
     These settings are an order of magnitude faster than SciPy's defaults on normal matrices of meshes. The
-    symbolic analysis is repeated at every step (SuperLU's interface keeps none).
+    symbolic analysis is repeated for every factor (SuperLU's interface keeps none).
     """
 
     name = "scipy"
 
-    def prepare(self, structure: Structure) -> None:
+    def analyse(self, lower: LowerTriangle) -> None:
         """Builds the full symmetric pattern."""
-        self._pattern = structure.normal_pattern.full
-        self._size = structure.num_unknowns
+        self._full, self._size = lower.full, lower.size
 
-    def factorise(self, values: np.ndarray, accuracy: float) -> Substitution:
+    def factor(self, values: np.ndarray) -> Substitution:
         """See :class:`SparseDirect`."""
         from scipy.sparse.linalg import splu
 
-        offsets, rows, source = self._pattern
+        offsets, rows, source = self._full
         matrix = sp.csc_matrix((values[source], rows, offsets), (self._size, self._size))
         try:
             factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         except RuntimeError as error:
             raise SingularSystemError(f"SuperLU: {error}") from None
-        return factor.solve
+        return lambda right, accuracy: factor.solve(right)

@@ -1,0 +1,121 @@
+"""Symmetric positive definite matrices from anywhere: every solver, one and many right-hand sides, clear refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import torch
+from torch import Tensor
+
+from torchfair import ShapeError
+from torchfair.errors import SettingsError, SingularSystemError
+from torchfair.linear import ConjugateGradients, MatrixSystem, RslabDirect, factorise
+
+SOLVERS = ["dense", "scipy", "cg", "auto", *(["rslab"] if RslabDirect.available() else [])]
+
+
+def grid_laplacian(side: int = 7) -> sp.csr_matrix:
+    """Of a square grid with Dirichlet boundary: symmetric, positive definite."""
+    chain = sp.diags([-np.ones(side - 1), 2 * np.ones(side), -np.ones(side - 1)], [-1, 0, 1])
+    return sp.csr_matrix(sp.kronsum(chain, chain))
+
+
+FORMS: dict[str, Callable[[sp.csr_matrix], object]] = {
+    "csr": lambda m: m,
+    "csc": lambda m: m.tocsc(),
+    "coo array": sp.coo_array,
+    "torch csr": lambda m: torch.from_numpy(m.toarray()).to_sparse_csr(),
+    "torch coo": lambda m: torch.from_numpy(m.toarray()).to_sparse(),
+    "torch dense": lambda m: torch.from_numpy(m.toarray()),
+}
+
+
+@pytest.mark.filterwarnings("ignore:Sparse CSR tensor support")
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_solutions_solve_whatever_form_the_matrix_has(form: str, solver: str) -> None:
+    matrix = grid_laplacian()
+    damping = torch.linspace(0.0, 1.0, 49, dtype=torch.float64)
+    right = torch.randn(49, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    factor = factorise(FORMS[form](matrix), damping, solver=solver)
+    dense = torch.from_numpy(matrix.toarray()) + torch.diag(damping)
+    many, one = factor.solve(right), factor.solve(right[:, 0])
+    torch.testing.assert_close(many.values, torch.linalg.solve(dense, right), atol=1e-8, rtol=0)
+    torch.testing.assert_close(one.values, many.values[:, 0], atol=1e-8, rtol=0)
+    assert one.remainder.shape == (49,)
+    torch.testing.assert_close(dense @ many.values + many.remainder, right, atol=1e-8, rtol=0)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_diagonal_entries_that_are_not_stored_may_be_damped(solver: str) -> None:
+    matrix = sp.csr_matrix(np.array([[0.0, 0.0], [0.0, 2.0]]))
+    matrix.eliminate_zeros()
+    solution = factorise(matrix, torch.tensor([4.0, 0.0], dtype=torch.float64), solver=solver)
+    assert solution.solve(torch.tensor([1.0, 1.0], dtype=torch.float64)).values.tolist() == pytest.approx([0.25, 0.5])
+
+
+def test_lower_triangle_and_its_full_matrix_agree() -> None:
+    system = MatrixSystem(grid_laplacian(4))
+    lower, values = system.lower, system.lower_values.numpy()
+    full = lower.matrix(values) + sp.triu(lower.matrix(values).T, k=1)
+    assert (full != grid_laplacian(4)).nnz == 0
+    offsets, rows, source = lower.full
+    assert (sp.csc_matrix((values[source], rows, offsets)) != grid_laplacian(4)).nnz == 0
+    assert (lower.rows[lower.diagonal] == np.arange(16)).all()
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("diagonal", [[1.0, -1.0, 2.0], [1.0, float("nan"), 1.0]], ids=["indefinite", "nan"])
+def test_what_is_not_positive_definite_is_refused(solver: str, diagonal: list[float]) -> None:
+    if solver == "scipy" and diagonal[1] == -1.0:
+        pytest.skip("SuperLU does not tell the signs of its pivots")
+    matrix = np.diag(diagonal)
+    matrix[0, 2] = matrix[2, 0] = 0.5
+    with pytest.raises(SingularSystemError):
+        factorise(torch.from_numpy(matrix), solver=solver).solve(torch.ones(3, dtype=torch.float64))
+
+
+@pytest.mark.parametrize("matrix", [torch.ones(2, 3), torch.ones(2, 2, dtype=torch.int64), sp.identity(2, dtype=int)])
+def test_other_things_than_square_floating_matrices_are_refused(matrix: object) -> None:
+    with pytest.raises(ShapeError, match="square matrix of floating numbers"):
+        factorise(matrix)
+
+
+def test_unknown_solvers_are_refused_with_the_known_ones() -> None:
+    with pytest.raises(SettingsError, match="choose auto, dense, scipy"):
+        factorise(grid_laplacian(), solver="magic")
+
+
+def test_columns_of_conjugate_gradients_are_as_accurate_as_asked_each() -> None:
+    """One easy and one hard right-hand side: neither stops the other early, the easy one is not spoilt."""
+    matrix = grid_laplacian()
+    eigenvector = torch.from_numpy(np.linalg.eigh(matrix.toarray())[1][:, 0].copy())
+    hard = torch.randn(49, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+    right = torch.stack([eigenvector, torch.zeros_like(hard), hard], 1)
+    for accuracy in (1e-2, 1e-6):
+        solution = factorise(matrix, solver="cg").solve(right, accuracy)
+        sizes, bounds = solution.remainder.norm(dim=0), accuracy * right.norm(dim=0)
+        assert (sizes <= bounds).all()
+        exact = right - torch.from_numpy(matrix.toarray()) @ solution.values
+        torch.testing.assert_close(exact, solution.remainder, atol=1e-12, rtol=0)
+    assert 1 < factorise(matrix, solver="cg").solve(hard, 1e-6).iterations < 49
+
+
+class Counting(ConjugateGradients):
+    """An own solver: knows nothing but the protocol."""
+
+    prepared = 0
+
+    def prepare(self, pattern: object) -> None:
+        self.prepared += 1
+
+
+def test_an_own_solver_is_used() -> None:
+    solver = Counting()
+    right = torch.ones(49, dtype=torch.float64)
+    values: Tensor = factorise(grid_laplacian(), solver=solver).solve(right, 1e-10).values
+    torch.testing.assert_close(torch.from_numpy(grid_laplacian().toarray()) @ values, right, atol=1e-8, rtol=0)
+    assert solver.prepared == 1

@@ -1,0 +1,172 @@
+"""A batch solved as one system: every member as if it were alone."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from helpers import DOUBLE, wavy_grid
+from torch import Tensor
+
+from torchfair import ShapeError, Topology
+from torchfair.constraints import closeness_terms, interior_fairness_terms, normal_variation_terms
+from torchfair.constraints.closeness import TangentPlanes
+from torchfair.geometry.closest_point import ReferenceSurface
+from torchfair.projection import ElementTerm, GuidedProjection, OneSided, ProjectionResult, ProjectionSettings, Status
+
+
+def stretched(x: Tensor) -> Tensor:
+    return torch.linalg.vector_norm(x[1] - x[0]) - 1.0
+
+
+def held(x: Tensor, place: Tensor) -> Tensor:
+    return x[0] - place
+
+
+def below(x: Tensor) -> Tensor:
+    return x[0, 2] - 0.05
+
+
+def net_terms(vertices: Tensor, topology: Topology) -> list[ElementTerm]:
+    """Lengths, places and a ceiling: linear, one-sided and weighted terms, well-conditioned."""
+    every = torch.arange(vertices.shape[0])[:, None]
+    weights = torch.linspace(0.5, 2.0, vertices.shape[0], dtype=DOUBLE)
+    return [
+        ElementTerm("length", stretched, [("x", topology.edges)]),
+        ElementTerm("held", held, [("x", every)], data=(1.2 * vertices,), linear=True),
+        ElementTerm("weighted", held, [("x", every)], data=(vertices,), element_weights=weights),
+        ElementTerm("ceiling", below, [("x", every)], weight=30.0, loss=OneSided()),
+    ]
+
+
+def net() -> tuple[GuidedProjection, Tensor]:
+    vertices, topology = wavy_grid(6, 5, triangles=True)
+    noise = torch.randn(7, 30, 3, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
+    sizes = torch.tensor([0.0, 0.01, 0.1, 0.2, 0.3, 0.5, 0.8], dtype=DOUBLE)
+    fixed = {"x": torch.arange(30) < 3}
+    problem = GuidedProjection({"x": vertices}, net_terms(vertices, topology), fixed=fixed, solver="scipy")
+    return problem, vertices + sizes[:, None, None] * noise
+
+
+def assert_same(together: list[ProjectionResult], alone: list[ProjectionResult]) -> None:
+    for mine, other in zip(together, alone, strict=True):
+        assert mine.status is other.status
+        assert mine.iterations == other.iterations
+        torch.testing.assert_close(mine.blocks["x"], other.blocks["x"], atol=1e-9, rtol=0)
+        rows, known = mine.residuals + mine.initial_residuals, other.residuals + other.initial_residuals
+        for row, twin in zip(rows, known, strict=True):
+            assert (row.name, row.elements, row.weight) == (twin.name, twin.elements, twin.weight)
+            numbers = (twin.mean, twin.largest, twin.merit)
+            assert (row.mean, row.largest, row.merit) == pytest.approx(numbers, abs=1e-8)
+        for step, twin in zip(mine.history, other.history, strict=True):
+            assert (step.accepted, step.iteration) == (twin.accepted, twin.iteration)
+            assert step.merit == pytest.approx(twin.merit, rel=1e-9)
+            assert step.damping == pytest.approx(
+                twin.damping, rel=1e-2, nan_ok=True
+            )  # of vanishing differences at the end
+
+
+def test_members_end_as_they_do_alone() -> None:
+    """They need different numbers of steps, so that some leave while others go on."""
+    problem, starts = net()
+    settings = ProjectionSettings(max_iterations=40)
+    alone = [problem.solve({"x": start}, settings=settings) for start in starts]
+    assert len({result.iterations for result in alone}) > 2
+    assert_same(problem.solve_batch({"x": starts}, settings=settings), alone)
+
+
+def test_members_stop_at_limits_as_they_do_alone() -> None:
+    problem, starts = net()
+    settings = ProjectionSettings(max_iterations=3)
+    together = problem.solve_batch({"x": starts}, settings=settings)
+    assert_same(together, [problem.solve({"x": start}, settings=settings) for start in starts])
+    assert Status.MAX_ITERATIONS in {result.status for result in together}
+
+
+def test_data_are_refreshed_for_each_member() -> None:
+    """Closest points on one surface from the vertices of every member, and E."""
+    vertices, topology = wavy_grid(6, 5, triangles=True)
+    planes = TangentPlanes(ReferenceSurface(vertices, topology), block="x")
+    terms = [
+        *normal_variation_terms(topology, smoothing=0.1, block="x"),
+        *interior_fairness_terms(topology, weight=0.1, block="x"),
+        *closeness_terms(planes, torch.arange(30), weight=10.0, block="x"),
+        ElementTerm("held", held, [("x", torch.arange(30)[:, None])], data=(vertices,), linear=True),
+    ]
+    noise = 0.1 * torch.randn(4, 30, 3, dtype=DOUBLE, generator=torch.Generator().manual_seed(1))
+    problem = GuidedProjection({"x": vertices}, terms, solver="scipy")
+    settings = ProjectionSettings(max_iterations=6)
+    alone = [problem.solve({"x": start}, settings=settings) for start in vertices + noise]
+    assert_same(problem.solve_batch({"x": vertices + noise}, settings=settings), alone)
+
+
+def test_blocks_of_several_sizes() -> None:
+    """Nodes of width three and one; a member is rows of each."""
+    vertices, topology = wavy_grid(4, 4)
+    edges = topology.edges
+
+    def slack(x: Tensor, s: Tensor) -> Tensor:
+        return torch.linalg.vector_norm(x[1] - x[0]) - s[0, 0] ** 2
+
+    def small(s: Tensor) -> Tensor:
+        return s[0, 0] - 1.0
+
+    rows = torch.arange(edges.shape[0])[:, None]
+    terms = [
+        ElementTerm("slack", slack, [("x", edges), ("s", rows)]),
+        ElementTerm("small", small, [("s", rows)]),
+        ElementTerm("held", held, [("x", torch.arange(16)[:, None])], data=(vertices,), linear=True),
+    ]
+    generator = torch.Generator().manual_seed(2)
+    starts = {
+        "x": vertices + 0.2 * torch.randn(3, 16, 3, dtype=DOUBLE, generator=generator),
+        "s": 1.0 + 0.3 * torch.randn(3, edges.shape[0], 1, dtype=DOUBLE, generator=generator),
+    }
+    problem = GuidedProjection({name: block[0] for name, block in starts.items()}, terms, solver="scipy")
+    alone = [problem.solve({name: block[i] for name, block in starts.items()}) for i in range(3)]
+    together = problem.solve_batch(starts)
+    assert_same(together, alone)
+    for mine, other in zip(together, alone, strict=True):
+        torch.testing.assert_close(mine.blocks["s"], other.blocks["s"], atol=1e-9, rtol=0)
+
+
+def test_interruption_gives_every_member_its_best_state() -> None:
+    problem, starts = net()
+    calls = []
+
+    def interrupt(x: Tensor) -> Tensor:
+        calls.append(1)
+        if len(calls) > 12:
+            raise KeyboardInterrupt
+        return stretched(x)
+
+    terms = [*problem.terms[1:], ElementTerm("length", interrupt, problem.terms[0].stencil)]
+    results = GuidedProjection({"x": starts[0]}, terms, solver="scipy").solve_batch({"x": starts})
+    assert len(results) == len(starts)
+    assert {result.status for result in results} == {Status.INTERRUPTED}
+    for result in results:
+        assert math.isfinite(result.merit)
+        assert result.merit <= result.history[0].merit
+
+
+def test_dense_members_are_many_times_more_than_a_dense_solver_bears() -> None:
+    vertices, topology = wavy_grid(4, 4, triangles=True)
+    term = ElementTerm("length", stretched, [("x", topology.edges)])
+    problem = GuidedProjection({"x": vertices}, [term])
+    results = problem.solve_batch({"x": vertices.expand(20, -1, -1).clone()})
+    assert problem.solver.name == "dense"
+    assert results[0].solver != "dense"
+    assert max(result.residuals[0].largest for result in results) < 1e-6
+
+
+@pytest.mark.parametrize("shape", [(30, 3), (2, 29, 3), (2, 30, 2)])
+def test_blocks_of_other_shapes_are_refused(shape: tuple[int, ...]) -> None:
+    problem, _ = net()
+    with pytest.raises(ShapeError, match="blocks"):
+        problem.solve_batch({"x": torch.zeros(shape, dtype=DOUBLE)})
+
+
+def test_an_empty_batch_has_no_results() -> None:
+    problem, starts = net()
+    assert problem.solve_batch({"x": starts[:0]}) == []

@@ -1,0 +1,15 @@
+"""Linear solvers for symmetric positive definite matrices, behind one small protocol; they know no mesh."""
+
+from .base import Factor as Factor
+from .base import LinearSolver as LinearSolver
+from .base import Pattern as Pattern
+from .base import Solution as Solution
+from .base import System as System
+from .choose import choose_solver as choose_solver
+from .conjugate_gradients import ConjugateGradients as ConjugateGradients
+from .dense import DenseQR as DenseQR
+from .lower_triangle import LowerTriangle as LowerTriangle
+from .matrix import MatrixSystem as MatrixSystem
+from .matrix import factorise as factorise
+from .rslab_direct import RslabDirect as RslabDirect
+from .scipy_direct import ScipyDirect as ScipyDirect

@@ -1,0 +1,114 @@
+"""Terms compiled for blocks of given sizes: everything about a problem that does not change with the state."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
+
+import torch
+from torch import Tensor
+
+from ..errors import ShapeError
+from ..linear import DenseQR, LinearSolver, choose_solver
+from .layout import Layout, State
+from .replicate import replicated
+from .system import Structure
+from .term import ElementTerm
+
+_Problem = TypeVar("_Problem", bound="Problem")
+
+
+class Problem:
+    """Terms compiled for blocks of given sizes.
+
+    Args:
+        blocks: Example blocks ``(n, d)``; only sizes, dtype and device matter.
+        terms: What is to be small.
+        fixed: Masks ``(n,)`` or ``(n, d)`` by block name, True where an unknown stays as it is.
+        solver: Name of a linear solver, or an object with that protocol.
+
+    Attributes:
+        terms: All of them.
+        layout: How blocks lie in the flat vector of unknowns.
+        structure: Numbering, sparsity, index maps.
+        solver: The linear solver.
+    """
+
+    def __init__(
+        self,
+        blocks: State,
+        terms: Sequence[ElementTerm],
+        *,
+        fixed: Mapping[str, Tensor] | None = None,
+        solver: str | LinearSolver = "auto",
+    ) -> None:
+        if not blocks or not terms:
+            raise ShapeError("guided projection", "at least one block and one term", f"{len(blocks)} and {len(terms)}")
+        first = next(iter(blocks.values()))
+        for name, block in blocks.items():
+            if block.dtype != first.dtype or block.device != first.device:
+                raise ShapeError(
+                    f"block '{name}'", f"{first.dtype} on {first.device}", f"{block.dtype} on {block.device}"
+                )
+        self.terms, self._dtype = list(terms), first.dtype
+        self.layout = Layout.of(blocks)
+        free = self.layout.free_mask(fixed or {}, first.device)
+        self.structure = Structure(self.layout, self.terms, free, first.dtype)
+        self._asked: str | LinearSolver = solver
+        self._others: dict[object, Problem] = {}
+        self.solver = choose_solver(solver, self.structure) if isinstance(solver, str) else solver
+
+    def solved_by(self, solver: str | LinearSolver) -> Problem:
+        """This problem with another linear solver; itself for ``"auto"`` and for the solver it was made with."""
+        if solver in ("auto", self._asked):
+            return self
+        key = solver if isinstance(solver, str) else id(solver)
+        if key not in self._others:
+            other = copy.copy(self)
+            other._asked, other._others = solver, {}
+            other.solver = choose_solver(solver, self.structure) if isinstance(solver, str) else solver
+            self._others[key] = other
+        return self._others[key]
+
+    def with_terms(self: _Problem, terms: Sequence[ElementTerm]) -> _Problem:
+        """The same problem with other data, weights and losses of its terms; index maps and analysis are kept.
+
+        Args:
+            terms: On the same stencils as those before, in the same order.
+
+        Raises:
+            ShapeError: stencils differ, or other terms have elements and a weight.
+        """
+        result = copy.copy(self)
+        result._others = {}
+        result.terms = list(terms)
+        result.structure = self.structure.with_terms(terms)
+        if not result.structure.shares_pattern(self.structure):
+            result.solver = copy.copy(self.solver)  # each keeps the analysis of its own pattern
+        return result
+
+    def batched(self, count: int) -> Problem:
+        """The problems of ``count`` members with the same terms as one, see :class:`Layout`.
+
+        A dense solver, which is for few unknowns, is replaced by one that suits all members together.
+        """
+        result = copy.copy(self)
+        result._others = {}
+        result.layout = Layout({name: (count * n, d) for name, (n, d) in self.layout.sizes.items()}, count)
+        result.terms = [replicated(term, self.layout, count) for term in self.terms]
+        parts = self.layout.unflatten(self.structure.free)
+        free = torch.cat([part.repeat(count, 1).flatten() for part in parts.values()])
+        result.structure = Structure(result.layout, result.terms, free, self._dtype)
+        dense = isinstance(self.solver, DenseQR)
+        result.solver = choose_solver("auto", result.structure) if dense else copy.copy(self.solver)
+        return result
+
+    def check_blocks(self, blocks: State) -> None:
+        """Raises ShapeError unless blocks have the sizes that the terms were compiled for."""
+        if Layout.of(blocks).sizes != self.layout.sizes:
+            raise ShapeError("blocks", str(self.layout.sizes), str(Layout.of(blocks).sizes))
+
+    def prepare(self) -> None:
+        """Symbolic analysis; costs nothing where it is known."""
+        self.solver.prepare(self.structure)

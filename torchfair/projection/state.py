@@ -1,0 +1,71 @@
+"""Where a run of guided projection stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from torch import Tensor
+
+from .course import Course
+from .inequalities import Inequalities
+from .settings import ProjectionSettings
+from .system import Evaluation, LinearSystem
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """What the next steps from a state need of its linearisation.
+
+    Attributes:
+        system: Jacobians and residuals; of the inequalities those that are broken.
+        inequalities: All of them, None if there are none.
+        scale: (N,) positive diagonal that the damping multiplies.
+    """
+
+    system: LinearSystem
+    inequalities: Inequalities | None
+    scale: Tensor
+
+
+@dataclass(frozen=True)
+class ProjectionState:
+    """The best blocks found so far and all that is carried from step to step. Immutable.
+
+    Attributes:
+        evaluation: Blocks, residuals and merits.
+        linearised: There.
+        settings: Tolerances and damping.
+        courses: Merit, damping and status of each member of a batch; one for a single problem.
+        heeded: Inequalities that the last step took for equations.
+    """
+
+    evaluation: Evaluation
+    linearised: Linearised
+    settings: ProjectionSettings
+    courses: tuple[Course, ...]
+    heeded: Tensor | None = None
+
+    @property
+    def blocks(self) -> dict[str, Tensor]:
+        """The variable blocks, of all members one after the other."""
+        return dict(self.evaluation.state)
+
+    @property
+    def merit(self) -> float:
+        """Sum over members."""
+        return sum(course.merit for course in self.courses)
+
+    @property
+    def gradient(self) -> float:
+        """Largest scaled component of the gradient, see ``ProjectionResult``."""
+        return max(course.gradient for course in self.courses)
+
+    @property
+    def damping(self) -> float:
+        """Levenberg-Marquardt parameter of the next step, of the first member."""
+        return self.courses[0].damping.value
+
+    @property
+    def accuracy(self) -> float:
+        """Relative remainder asked of an iterative linear solver."""
+        return min(course.accuracy for course in self.courses)

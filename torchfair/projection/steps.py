@@ -1,0 +1,217 @@
+"""Guided projection step by step: ``init``, ``step``, ``finished`` over an immutable state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from ..errors import SettingsError, SingularSystemError
+from .course import Course, Outcome
+from .damping import Damping
+from .evaluate import check_start
+from .inequalities import Inequalities
+from .layout import State
+from .problem import Problem
+from .proposal import Proposal
+from .result import IterationRecord, Status
+from .settings import ProjectionSettings
+from .state import Linearised, ProjectionState
+from .stopwatch import Stopwatch
+from .system import Evaluation, LinearSystem
+from .trials import Guard, Trials
+
+_LONGEST_EXTRAPOLATION = 3.0
+
+
+@torch.no_grad()
+def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = None) -> ProjectionState:
+    """The state from which a run starts.
+
+    Args:
+        problem: Compiled terms, such as a :class:`~torchfair.projection.GuidedProjection`.
+        blocks: Start ``name -> (n, d)``, of the sizes that the problem was compiled for. Not modified.
+        settings: Tolerances and damping.
+
+    Raises:
+        ShapeError: blocks have other sizes.
+        SettingsError: settings ask for another linear solver than the problem was made for.
+        TorchfairError: a residual or Jacobian is not finite at the start; names the term and its elements.
+    """
+    settings = settings or ProjectionSettings()
+    if problem.solved_by(settings.solver) is not problem:
+        raise SettingsError(
+            f"the problem was made for the linear solver '{problem.solver.name}', but settings ask for another one: "
+            "make it with that one, or take problem.solved_by(settings.solver)"
+        )
+    problem.check_blocks(blocks)
+    evaluation = problem.structure.evaluate({name: block.detach().clone() for name, block in blocks.items()})
+    check_start(problem.structure, evaluation)
+    linearised, gradients = _linearise(problem, evaluation, settings)
+    damping = Damping(settings.initial_damping)
+    courses = [
+        Course(merit, gradient, damping, settings.accuracy)
+        for merit, gradient in zip(evaluation.merits.tolist(), gradients, strict=True)
+    ]
+    return ProjectionState(evaluation, linearised, settings, tuple(courses))
+
+
+@torch.no_grad()
+def of_members(problem: Problem, state: ProjectionState, chosen: list[int]) -> tuple[Problem, ProjectionState]:
+    """The problem and the state of some members of a batch alone, to go on without the others.
+
+    Args:
+        problem: Of one member.
+        state: Of the batch.
+        chosen: Numbers of members.
+    """
+    layout, before = state.linearised.system.structure.layout, state.linearised
+    smaller = problem.batched(len(chosen))
+    flat = layout.chosen_members(layout.flatten(state.evaluation.state), chosen)
+    evaluation = smaller.structure.evaluate(smaller.layout.unflatten(flat))
+    linearised, _ = _linearise(smaller, evaluation, state.settings)
+    heeded = state.heeded
+    if heeded is not None and before.inequalities is not None:
+        heeded = before.inequalities.chosen_members(heeded, chosen)
+    courses = tuple(state.courses[member] for member in chosen)
+    return smaller, replace(state, evaluation=evaluation, linearised=linearised, courses=courses, heeded=heeded)
+
+
+@torch.no_grad()
+def step(
+    problem: Problem, state: ProjectionState, guard: Guard | None = None
+) -> tuple[ProjectionState, IterationRecord]:
+    """One damped step.
+
+    Args:
+        problem: That of the state.
+        state: Not modified.
+        guard: ``guard(blocks, trial)`` refuses a trial by returning False.
+
+    Returns:
+        The next state, equal in its blocks to the last one if the step was not accepted, and what happened.
+    """
+    watch, settings, layout = Stopwatch(), state.settings, problem.layout
+    problem.prepare()
+    with watch.part("solve"):
+        proposal, dampings = _propose(problem, state)
+    if proposal is None:
+        return _singular(state, dampings, watch)
+    trials = Trials(problem, state, proposal, guard, watch)
+    _try(trials, proposal, state)
+    best = trials.best()
+    linearised, gradients = state.linearised, [course.gradient for course in state.courses]
+    if best is not None:
+        with watch.part("linearise"):
+            linearised, gradients = _linearise(problem, best, settings)
+    sizes = layout.member_largest(proposal.change.abs())
+    short = sizes <= settings.step_tolerance * (trials.reach + settings.step_tolerance)
+    outcomes = map(Outcome, dampings, trials.gains, sizes.tolist(), short.tolist(), trials.taken)
+    courses = tuple(
+        course
+        if course.finished(settings)
+        else course.after(outcome, merit, gradient, settings, inexact=problem.solver.inexact)
+        for course, outcome, merit, gradient in zip(state.courses, outcomes, trials.merits, gradients, strict=True)
+    )
+    evaluation = best or state.evaluation
+    after = replace(state, evaluation=evaluation, linearised=linearised, courses=courses, heeded=proposal.heeded)
+    return after, record_of(after, inner_iterations=proposal.iterations, timings=watch.parts)
+
+
+def finished(state: ProjectionState) -> Status | None:
+    """Why a run ends at this state; None if it goes on. A batch goes on while a member does."""
+    statuses = [course.finished(state.settings) for course in state.courses]
+    return None if None in statuses else statuses[0]
+
+
+def _linearise(
+    problem: Problem, evaluation: Evaluation, settings: ProjectionSettings
+) -> tuple[Linearised, list[float]]:
+    """Also the largest scaled component of the gradient, for each member."""
+    system = problem.structure.linearise(evaluation)
+    inequalities = Inequalities.of(system)
+    if inequalities is not None:
+        system = inequalities.heeding(inequalities.broken)
+    scale = _scale(system, settings)
+    gradients: list[float] = problem.layout.member_largest(system.gradient.abs() / scale.sqrt()).tolist()
+    return Linearised(system, inequalities, scale), gradients
+
+
+def _scale(system: LinearSystem, settings: ProjectionSettings) -> Tensor:
+    """Positive diagonal that the damping multiplies; one where nothing is felt."""
+    if settings.damping_scale == "identity":
+        return torch.ones_like(system.gradient)
+    diagonal = system.diagonal
+    floor = 1e-12 * float(diagonal.max())
+    floored = diagonal.clamp_min(floor if 0.0 < floor < math.inf else 1.0)
+    return torch.where(diagonal > 0.0, floored, torch.ones_like(diagonal))
+
+
+def _propose(problem: Problem, state: ProjectionState) -> tuple[Proposal | None, list[Damping]]:
+    """A solution of the damped system, None where it is singular at every damping; and the damping it needed."""
+    dampings, at = [course.damping for course in state.courses], state.linearised
+    while not any(damping.exhausted for damping in dampings):
+        values = at.scale.new_tensor([damping.value for damping in dampings])
+        diagonal = problem.layout.member_spread(values) * at.scale
+        try:
+            if at.inequalities is None:
+                return Proposal.of(at.system, problem.solver, diagonal, state.accuracy), dampings
+            return at.inequalities.propose(problem.solver, diagonal, state.heeded, state.accuracy), dampings
+        except SingularSystemError:
+            dampings = [damping.rejected() for damping in dampings]
+    return None, dampings
+
+
+def _try(trials: Trials, proposal: Proposal, state: ProjectionState) -> None:
+    """Offers the step, the step corrected for curvature, and a longer one where it gained more than promised."""
+    change, settings = proposal.change, state.settings
+    trial = trials.offer(change)
+    bent = [gain < settings.least_gain_uncorrected for gain in trials.gains]
+    if trial is not None and any(bent):
+        trials.offer(proposal.corrected(trial, change, state.accuracy), bent)
+    # A reweighted model lies above the merit: with a gain of 1.5 its curvature is twice too large, and
+    # the best step along the same line is twice as long.
+    factors = [_extrapolation(gain) for gain in trials.gains]
+    longer = [factor > settings.least_extrapolation for factor in factors]
+    if any(longer):
+        spread = proposal.system.structure.layout.member_spread(change.new_tensor(factors))
+        trials.offer(spread * change, longer, again=True)
+
+
+def _extrapolation(gain: float) -> float:
+    """Length, in steps, at which a parabola is lowest that starts as promised and has the gain seen."""
+    return min(1.0 / (2.0 - gain), _LONGEST_EXTRAPOLATION) if gain < 2.0 else _LONGEST_EXTRAPOLATION
+
+
+def _singular(
+    state: ProjectionState, dampings: Sequence[Damping], watch: Stopwatch
+) -> tuple[ProjectionState, IterationRecord]:
+    courses = []
+    for course, damping in zip(state.courses, dampings, strict=True):
+        last = Outcome(damping, -math.inf, 0.0, False, False)
+        courses.append(replace(course, iteration=course.iteration + 1, last=last, status=Status.SINGULAR))
+    after = replace(state, courses=tuple(courses))
+    return after, record_of(after, inner_iterations=0, timings=watch.parts)
+
+
+def record_of(
+    state: ProjectionState, member: int = 0, *, inner_iterations: int = 0, timings: dict[str, float] | None = None
+) -> IterationRecord:
+    """What became of the last step of a member; of the start where no step has been made."""
+    course = state.courses[member]
+    last = course.last or Outcome(Damping(math.nan), math.nan, 0.0, False, True)
+    return IterationRecord(
+        iteration=course.iteration,
+        merit=course.merit,
+        damping=last.damping.value,
+        gain=last.gain,
+        step=last.size,
+        gradient=course.gradient,
+        accepted=last.accepted,
+        inner_iterations=inner_iterations,
+        elapsed=0.0,
+        timings=timings or {},
+    )
