@@ -9,8 +9,32 @@ from .damping import Damping
 from .result import Status
 from .settings import ProjectionSettings
 
-_TIGHTEST_ACCURACY = 1e-8
-_PATIENCE_WHEN_DAMPED = 4
+_ROUNDING = 2.0**-51  # falls below this fraction of the merit cannot be computed
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Numbers of one member at its best state.
+
+    Attributes:
+        merit: Sum of the true losses.
+        gradient: Largest cosine between the residual and a column of the Jacobian, ``|J_i . r| / (|J_i| |r|)``.
+        floor: Merit below which all residuals are zero, as far as ``step_tolerance`` tells: what a relative change of
+            the unknowns by that much makes of it.
+    """
+
+    merit: float
+    gradient: float
+    floor: float
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether all residuals are zero, as far as can be told."""
+        return self.merit <= self.floor
+
+    def is_flat(self, settings: ProjectionSettings) -> bool:
+        """Whether there are residuals, but no gradient."""
+        return self.gradient <= settings.gradient_tolerance and not self.is_zero
 
 
 @dataclass(frozen=True)
@@ -21,7 +45,7 @@ class Outcome:
         damping: With which it was made.
         gain: Actual decrease of the merit over the predicted one.
         size: Largest change of an unknown.
-        short: Whether that is below the tolerance of steps.
+        short: Whether the step is below ``step_tolerance``, or promises a fall that cannot be computed.
         accepted: Whether it was taken.
     """
 
@@ -37,68 +61,100 @@ class Course:
     """The numbers that are carried from step to step.
 
     Attributes:
-        merit: Of the best state.
-        gradient: Its largest scaled component there.
+        standing: At the best state.
         damping: Of the next step.
         accuracy: Relative remainder asked of an iterative linear solver.
         iteration: Damped steps tried so far.
-        falls: Relative decreases of the merit in accepted steps, the last ones.
+        falls: Relative decreases of the merit in the last accepted steps.
         last: What became of the last step.
-        status: Why the last step ended the run, if it did.
+        suspicion: Status that the run ends with if a minimum is certified here.
+        doubted: Whether this state was suspected before.
+        status: Why the run ends, if it does.
     """
 
-    merit: float
-    gradient: float
+    standing: Standing
     damping: Damping
     accuracy: float
     iteration: int = 0
     falls: tuple[float, ...] = ()
     last: Outcome | None = None
+    suspicion: Status | None = None
+    doubted: bool = False
     status: Status | None = None
 
-    def after(
-        self, outcome: Outcome, merit: float, gradient: float, settings: ProjectionSettings, *, inexact: bool
-    ) -> Course:
+    @property
+    def merit(self) -> float:
+        """Of the best state."""
+        return self.standing.merit
+
+    @property
+    def gradient(self) -> float:
+        """Its scaled gradient, see :class:`Standing`."""
+        return self.standing.gradient
+
+    def after(self, outcome: Outcome, standing: Standing, settings: ProjectionSettings, *, inexact: bool) -> Course:
         """After a step.
 
         Args:
             outcome: What became of it.
-            merit: Of the best state now.
-            gradient: Likewise.
+            standing: At the best state now.
             settings: Tolerances.
             inexact: Whether the linear solver is only as accurate as asked for.
         """
         tried = replace(self, iteration=self.iteration + 1, last=outcome)
         if not outcome.accepted:
             damping = outcome.damping.rejected()
-            status = Status.STALLED if outcome.short or damping.exhausted else None
-            return replace(tried, damping=damping, status=status)
-        moved = replace(tried, merit=merit, gradient=gradient, damping=outcome.damping.accepted(outcome.gain))
-        moved = moved._settled((self.merit - merit) / self.merit, outcome.damping.value, settings, inexact)
-        return replace(moved, status=Status.STEP_TOLERANCE) if outcome.short else moved
+            suspected = damping.exhausted or (outcome.short and not self.doubted)
+            return replace(
+                tried,
+                damping=damping,
+                suspicion=Status.STEP_TOLERANCE if suspected else None,
+                doubted=self.doubted or suspected,
+            )
+        fall = (self.merit - standing.merit) / self.merit
+        moved = replace(
+            tried,
+            standing=standing,
+            damping=outcome.damping.accepted(outcome.gain),
+            falls=(*self.falls, fall)[-settings.patience :],
+            doubted=False,
+        )
+        if outcome.short:
+            return replace(moved, suspicion=Status.STEP_TOLERANCE)
+        return moved._rested(settings, inexact)
 
-    def _settled(self, fall: float, damping: float, settings: ProjectionSettings, inexact: bool) -> Course:
+    def _rested(self, settings: ProjectionSettings, inexact: bool) -> Course:
         """Whether the merit has come to rest; if so, with an iterative linear solver also when that is tightened.
 
-        Steps that heavy damping kept short say little, so more of them are waited for. A relative remainder
-        changes the decrease of the merit by its square, hence the tightest one worth asking for.
+        A relative remainder changes the decrease of the merit by its square, hence the tightest one worth asking for.
         """
-        patience = settings.patience * (1 if damping <= settings.initial_damping else _PATIENCE_WHEN_DAMPED)
-        falls = (*self.falls, fall)[-_PATIENCE_WHEN_DAMPED * settings.patience :]
-        after = replace(self, falls=falls)
-        if len(falls) < patience or max(falls[-patience:]) >= settings.merit_tolerance:
-            return after
-        tightest = max(0.1 * math.sqrt(settings.merit_tolerance), _TIGHTEST_ACCURACY)
-        if inexact and self.accuracy > tightest:
-            return replace(after, accuracy=max(0.1 * self.accuracy, tightest), falls=())
-        return replace(after, status=Status.MERIT_TOLERANCE)
+        if self.standing.is_flat(settings):
+            return replace(self, suspicion=Status.GRADIENT_TOLERANCE)
+        if len(self.falls) < settings.patience or sum(self.falls) >= settings.merit_tolerance:
+            return self
+        if inexact and self.accuracy > tightest_accuracy(settings):
+            return replace(self, accuracy=max(0.1 * self.accuracy, tightest_accuracy(settings)), falls=())
+        return replace(self, suspicion=Status.MERIT_TOLERANCE)
+
+    def judged(self, *, certified: bool) -> Course:
+        """After a suspicion: the end where a minimum is certified; else it goes on, unless no damping is left."""
+        status = self.suspicion if certified else Status.STALLED if self.damping.exhausted else None
+        return replace(self, suspicion=None, falls=self.falls if certified else (), status=status)
 
     def finished(self, settings: ProjectionSettings) -> Status | None:
         """Why it ends; None if it goes on."""
         if self.status is not None:
             return self.status
-        if self.merit == 0.0:
+        if self.standing.is_zero:
             return Status.ZERO_MERIT
-        if self.gradient <= settings.gradient_tolerance:
-            return Status.GRADIENT_TOLERANCE
         return Status.MAX_ITERATIONS if self.iteration >= settings.max_iterations else None
+
+
+def tightest_accuracy(settings: ProjectionSettings) -> float:
+    """Relative remainder beyond which an iterative linear solver is not asked to go."""
+    return max(0.1 * math.sqrt(settings.merit_tolerance), 1e-8)
+
+
+def cannot_be_computed(predicted: float, merit: float) -> bool:
+    """Whether a predicted fall of the merit is below its rounding errors."""
+    return predicted <= _ROUNDING * merit

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-LARGEST = 1e16
-SMALLEST = 1e-16
+LARGEST = 1e20
+SMALLEST = 1e-60  # from far starts the largest stiffness met is many powers of ten above that at the minimum
+_FASTEST_FALL = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Damping:
 
     def accepted(self, gain: float) -> Damping:
         """After an accepted step whose actual over predicted decrease is ``gain``."""
-        return Damping(max(self.value * max(1.0 / 3.0, 1.0 - (2.0 * min(gain, 1.0) - 1.0) ** 3), SMALLEST))
+        return Damping(max(self.value * max(_FASTEST_FALL, 1.0 - (2.0 * min(gain, 1.0) - 1.0) ** 3), SMALLEST))
 
     def rejected(self) -> Damping:
         """After a rejected step or a singular system."""

@@ -40,8 +40,8 @@ class Proposal:
         fall = 0.5 * structure.layout.member_sums(change * (damping * change - system.gradient + solution.remainder))
         return cls(change, fall, solution.iterations, system, factor, damping)
 
-    def corrected(self, trial: Evaluation, step: Tensor, accuracy: float) -> Tensor:
-        """(N,) a step that takes the curvature of the residuals into account.
+    def correction(self, trial: Evaluation, step: Tensor, accuracy: float) -> Tensor:
+        """(N,) what is to be added to the step because residuals are curved.
 
         Stiff curved constraints bend away from the linear model: ``r(x + d) = r + J d + (second order)``. With the
         residuals seen at the trial the same damped problem is solved once more, now for the second-order part; the
@@ -54,4 +54,4 @@ class Proposal:
         """
         right = -(self.system.gradient_with(trial) + self.damping * step)
         correction: Tensor = self.factor.solve(right, accuracy).values * self.system.structure.free
-        return step + correction
+        return correction

@@ -11,30 +11,34 @@ from torch import Tensor
 if TYPE_CHECKING:
     from .state import ProjectionState
 
+_RECENT = 10  # steps
+
 
 class Status(enum.Enum):
     """Why the iteration ended. ``message`` says what it means and what to do about it."""
 
-    STEP_TOLERANCE = "the step is shorter than step_tolerance: converged"
+    STEP_TOLERANCE = "steps are shorter than step_tolerance and an undamped one promises no more: converged"
     GRADIENT_TOLERANCE = "the gradient is smaller than gradient_tolerance: converged"
-    MERIT_TOLERANCE = "the merit no longer falls by more than merit_tolerance: converged"
-    ZERO_MERIT = "every residual is zero: converged"
+    MERIT_TOLERANCE = "the merit no longer falls by more than merit_tolerance and none is promised: converged"
+    ZERO_MERIT = "every residual is zero, as far as step_tolerance tells: converged"
     MAX_ITERATIONS = "max_iterations reached: allow more iterations, or accept the result, which is the best found"
     TIME_LIMIT = "time_limit reached: allow more time, or accept the result, which is the best found"
-    STALLED = "no damped step lowers the merit: converged as far as the arithmetic and the linear solver allow"
+    STALLED = (
+        "not converged: no damped step lowers the merit although the gradient is not small; residuals are not smooth "
+        "here, their derivatives wrong, or the guard refuses what would help"
+    )
     INTERRUPTED = "interrupted: the result is the best state found until then"
     CALLBACK = "stopped by the callback: the result is the best state found until then"
     SINGULAR = "the linear system stayed singular at the largest damping: check the term named below"
 
     @property
     def converged(self) -> bool:
-        """Whether a tolerance was met."""
+        """Whether a tolerance was met at a state that was certified to be a minimum."""
         return self in {
             Status.STEP_TOLERANCE,
             Status.GRADIENT_TOLERANCE,
             Status.MERIT_TOLERANCE,
             Status.ZERO_MERIT,
-            Status.STALLED,
         }
 
 
@@ -65,7 +69,9 @@ class IterationRecord:
         damping: Levenberg-Marquardt parameter with which the step was made.
         gain: Actual decrease of the merit over the predicted one.
         step: Largest change of an unknown.
-        gradient: Largest scaled component of the gradient.
+        gradient: Scaled gradient of the best state: the largest cosine between the residual and a column of the
+            Jacobian. It has no unit; at a minimum with residuals it is nearly zero, where all residuals vanish it means
+            nothing.
         accepted: Whether the step was taken.
         inner_iterations: Iterations of the linear solver; with inequalities, over all systems solved for the step.
         elapsed: Seconds since the start.
@@ -120,6 +126,17 @@ class ProjectionResult:
     def merit(self) -> float:
         """Final merit."""
         return self.history[-1].merit
+
+    @property
+    def gradient(self) -> float:
+        """Scaled gradient of the final state, see :class:`IterationRecord`."""
+        return self.history[-1].gradient
+
+    @property
+    def recent_fall(self) -> float:
+        """By which fraction the merit still fell in the last ten accepted steps (or in as many as there were)."""
+        merits = [record.merit for record in self.history if record.accepted][-_RECENT - 1 :]
+        return (merits[0] - merits[-1]) / merits[0] if merits and merits[0] > 0.0 else 0.0
 
     @property
     def iterations(self) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from ..linear import LinearSolver
@@ -15,19 +14,22 @@ class ProjectionSettings:
     Attributes:
         max_iterations: Bound on damped steps, rejected ones included.
         initial_damping: First Levenberg-Marquardt parameter, relative to the damping scale.
-        damping_scale: ``"diagonal"`` damps each unknown in proportion to its stiffness (the diagonal of
-            ``J^T J``), which makes the iteration independent of the units of the unknowns; ``"identity"``
-            damps all unknowns alike, the paper's ``w_reg |X - X_prev|^2``.
-        gradient_tolerance: Stop when the scaled gradient is below this.
-        step_tolerance: Stop when an accepted step is below this, relative to the size of the unknowns.
-        merit_tolerance: Stop when each of the last ``patience`` accepted steps lowered the merit by less than
-            this fraction (four times as many steps while the damping is above its start).
-        patience: See ``merit_tolerance``.
+        damping_scale: ``"diagonal"`` damps each unknown in proportion to its stiffness (the largest diagonal entry of
+            ``J^T J`` met so far, More 1978), which makes the iteration independent of the units of the unknowns;
+            ``"identity"`` damps all unknowns alike, the paper's ``w_reg |X - X_prev|^2``.
+        gradient_tolerance: Stop when the scaled gradient, the largest cosine between the residual and a column of the
+            Jacobian, is below this.
+        step_tolerance: Stop when a step is below this, relative to the size of the unknowns, both weighted by
+            stiffness; or when the merit is below what a change of the unknowns by this fraction makes of it.
+        merit_tolerance: Stop when the last ``patience`` accepted steps together lowered the merit by less than this
+            fraction.
+        patience: See ``merit_tolerance``. A run ends as converged only if, besides one of these tests, an undamped step
+            promises no fall of the merit by more than ``merit_tolerance``; otherwise it goes on.
         least_extrapolation: A step that gained more than predicted is tried again at the length at which a
             parabola through what was seen is smallest, if that is more than this many times longer;
             infinity never tries.
-        least_gain_uncorrected: A step that gained less than this is tried again with a second-order correction; minus
-            infinity never tries.
+        least_uncorrected_gain: A step that gained less than this, relative to what the model promised, is tried again
+            with a second-order correction; minus infinity never tries.
         time_limit: Seconds, or None.
         accuracy: Relative remainder with which an iterative linear solver starts; tightened as the merit
             settles.
@@ -42,7 +44,7 @@ class ProjectionSettings:
     merit_tolerance: float = 1e-9
     patience: int = 3
     least_extrapolation: float = 1.25
-    least_gain_uncorrected: float = -math.inf
+    least_uncorrected_gain: float = 0.9
     time_limit: float | None = None
     accuracy: float = 1e-2
     solver: str | LinearSolver = "auto"

@@ -19,12 +19,12 @@ class Linearised:
     Attributes:
         system: Jacobians and residuals; of the inequalities those that are broken.
         inequalities: All of them, None if there are none.
-        scale: (N,) positive diagonal that the damping multiplies.
+        stiffness: (N,) largest diagonal of ``J^T J`` that was met so far.
     """
 
     system: LinearSystem
     inequalities: Inequalities | None
-    scale: Tensor
+    stiffness: Tensor
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ import torch
 from torch import Tensor
 
 from ..errors import SettingsError, SingularSystemError
-from .course import Course, Outcome
+from .certificate import certified
+from .course import Course, Outcome, Standing, cannot_be_computed
 from .damping import Damping
 from .evaluate import check_start
 from .inequalities import Inequalities
@@ -21,10 +22,11 @@ from .result import IterationRecord, Status
 from .settings import ProjectionSettings
 from .state import Linearised, ProjectionState
 from .stopwatch import Stopwatch
-from .system import Evaluation, LinearSystem
+from .system import Evaluation
 from .trials import Guard, Trials
 
 _LONGEST_EXTRAPOLATION = 3.0
+_LARGEST_CORRECTION = 0.75  # of the step, in the norm of the damping (Transtrum and Sethna 2012)
 
 
 @torch.no_grad()
@@ -50,13 +52,18 @@ def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = 
     problem.check_blocks(blocks)
     evaluation = problem.structure.evaluate({name: block.detach().clone() for name, block in blocks.items()})
     check_start(problem.structure, evaluation)
-    linearised, gradients = _linearise(problem, evaluation, settings)
+    linearised, standings = _linearise(problem, evaluation, settings)
     damping = Damping(settings.initial_damping)
     courses = [
-        Course(merit, gradient, damping, settings.accuracy)
-        for merit, gradient in zip(evaluation.merits.tolist(), gradients, strict=True)
+        Course(
+            standing,
+            damping,
+            settings.accuracy,
+            suspicion=Status.GRADIENT_TOLERANCE if standing.is_flat(settings) else None,
+        )
+        for standing in standings
     ]
-    return ProjectionState(evaluation, linearised, settings, tuple(courses))
+    return _judged(problem, ProjectionState(evaluation, linearised, settings, tuple(courses)))
 
 
 @torch.no_grad()
@@ -73,6 +80,7 @@ def of_members(problem: Problem, state: ProjectionState, chosen: list[int]) -> t
     flat = layout.chosen_members(layout.flatten(state.evaluation.state), chosen)
     evaluation = smaller.structure.evaluate(smaller.layout.unflatten(flat))
     linearised, _ = _linearise(smaller, evaluation, state.settings)
+    linearised = replace(linearised, stiffness=layout.chosen_members(before.stiffness, chosen))
     heeded = state.heeded
     if heeded is not None and before.inequalities is not None:
         heeded = before.inequalities.chosen_members(heeded, chosen)
@@ -94,7 +102,7 @@ def step(
     Returns:
         The next state, equal in its blocks to the last one if the step was not accepted, and what happened.
     """
-    watch, settings, layout = Stopwatch(), state.settings, problem.layout
+    watch, settings = Stopwatch(), state.settings
     problem.prepare()
     with watch.part("solve"):
         proposal, dampings = _propose(problem, state)
@@ -103,21 +111,22 @@ def step(
     trials = Trials(problem, state, proposal, guard, watch)
     _try(trials, proposal, state)
     best = trials.best()
-    linearised, gradients = state.linearised, [course.gradient for course in state.courses]
+    linearised, standings = state.linearised, [course.standing for course in state.courses]
     if best is not None:
         with watch.part("linearise"):
-            linearised, gradients = _linearise(problem, best, settings)
-    sizes = layout.member_largest(proposal.change.abs())
-    short = sizes <= settings.step_tolerance * (trials.reach + settings.step_tolerance)
-    outcomes = map(Outcome, dampings, trials.gains, sizes.tolist(), short.tolist(), trials.taken)
+            linearised, standings = _linearise(problem, best, settings, state.linearised.stiffness)
     courses = tuple(
         course
         if course.finished(settings)
-        else course.after(outcome, merit, gradient, settings, inexact=problem.solver.inexact)
-        for course, outcome, merit, gradient in zip(state.courses, outcomes, trials.merits, gradients, strict=True)
+        else course.after(outcome, standing, settings, inexact=problem.solver.inexact)
+        for course, outcome, standing in zip(
+            state.courses, _outcomes(trials, proposal, dampings), standings, strict=True
+        )
     )
     evaluation = best or state.evaluation
     after = replace(state, evaluation=evaluation, linearised=linearised, courses=courses, heeded=proposal.heeded)
+    with watch.part("solve"):
+        after = _judged(problem, after)
     return after, record_of(after, inner_iterations=proposal.iterations, timings=watch.parts)
 
 
@@ -128,34 +137,60 @@ def finished(state: ProjectionState) -> Status | None:
 
 
 def _linearise(
-    problem: Problem, evaluation: Evaluation, settings: ProjectionSettings
-) -> tuple[Linearised, list[float]]:
-    """Also the largest scaled component of the gradient, for each member."""
-    system = problem.structure.linearise(evaluation)
+    problem: Problem, evaluation: Evaluation, settings: ProjectionSettings, stiffness: Tensor | None = None
+) -> tuple[Linearised, list[Standing]]:
+    """What the next steps need, and where each member stands."""
+    layout, system = problem.layout, problem.structure.linearise(evaluation)
     inequalities = Inequalities.of(system)
     if inequalities is not None:
         system = inequalities.heeding(inequalities.broken)
-    scale = _scale(system, settings)
-    gradients: list[float] = problem.layout.member_largest(system.gradient.abs() / scale.sqrt()).tolist()
-    return Linearised(system, inequalities, scale), gradients
-
-
-def _scale(system: LinearSystem, settings: ProjectionSettings) -> Tensor:
-    """Positive diagonal that the damping multiplies; one where nothing is felt."""
-    if settings.damping_scale == "identity":
-        return torch.ones_like(system.gradient)
     diagonal = system.diagonal
-    floor = 1e-12 * float(diagonal.max())
-    floored = diagonal.clamp_min(floor if 0.0 < floor < math.inf else 1.0)
-    return torch.where(diagonal > 0.0, floored, torch.ones_like(diagonal))
+    slopes = system.gradient.abs() / torch.where(diagonal > 0.0, diagonal, 1.0).sqrt()
+    lengths = (2.0 * evaluation.merits).sqrt()
+    cosines = layout.member_largest(slopes) / torch.where(lengths > 0.0, lengths, 1.0)
+    sizes = layout.member_sums(diagonal * layout.flatten(evaluation.state).square())
+    floors = 0.5 * settings.step_tolerance**2 * sizes
+    numbers = torch.stack([evaluation.merits, cosines, floors], 1).tolist()
+    stiffest = diagonal if stiffness is None else torch.maximum(diagonal, stiffness)
+    return Linearised(system, inequalities, stiffest), [Standing(*row) for row in numbers]
+
+
+def _damping(problem: Problem, state: ProjectionState, dampings: Sequence[Damping]) -> Tensor:
+    """(N,) the diagonal to be added; one where nothing is felt."""
+    stiffness = state.linearised.stiffness
+    values = problem.layout.member_spread(stiffness.new_tensor([damping.value for damping in dampings]))
+    scaled = values if state.settings.damping_scale == "identity" else values * stiffness
+    return torch.where(stiffness > 0.0, scaled.clamp_min(torch.finfo(scaled.dtype).tiny), 1.0)
+
+
+def _outcomes(trials: Trials, proposal: Proposal, dampings: Sequence[Damping]) -> list[Outcome]:
+    layout = proposal.system.structure.layout
+    sizes = layout.member_largest(proposal.change.abs()).tolist()
+    promises = zip(proposal.predicted.tolist(), trials.before, strict=True)
+    short = [
+        step or cannot_be_computed(*promise) for step, promise in zip(trials.is_short(proposal), promises, strict=True)
+    ]
+    return list(map(Outcome, dampings, trials.gains, sizes, short, trials.taken))
+
+
+def _judged(problem: Problem, state: ProjectionState) -> ProjectionState:
+    """Members that are suspected to be at a minimum either are there, or go on."""
+    if not any(course.suspicion for course in state.courses):
+        return state
+    problem.prepare()
+    answers = certified(problem, state)
+    courses = [
+        course.judged(certified=answer) if course.suspicion else course
+        for course, answer in zip(state.courses, answers, strict=True)
+    ]
+    return replace(state, courses=tuple(courses))
 
 
 def _propose(problem: Problem, state: ProjectionState) -> tuple[Proposal | None, list[Damping]]:
     """A solution of the damped system, None where it is singular at every damping; and the damping it needed."""
     dampings, at = [course.damping for course in state.courses], state.linearised
-    while not any(damping.exhausted for damping in dampings):
-        values = at.scale.new_tensor([damping.value for damping in dampings])
-        diagonal = problem.layout.member_spread(values) * at.scale
+    while not all(damping.exhausted for damping in dampings):
+        diagonal = _damping(problem, state, dampings)
         try:
             if at.inequalities is None:
                 return Proposal.of(at.system, problem.solver, diagonal, state.accuracy), dampings
@@ -169,9 +204,14 @@ def _try(trials: Trials, proposal: Proposal, state: ProjectionState) -> None:
     """Offers the step, the step corrected for curvature, and a longer one where it gained more than promised."""
     change, settings = proposal.change, state.settings
     trial = trials.offer(change)
-    bent = [gain < settings.least_gain_uncorrected for gain in trials.gains]
+    bent = [gain < settings.least_uncorrected_gain for gain in trials.gains]
     if trial is not None and any(bent):
-        trials.offer(proposal.corrected(trial, change, state.accuracy), bent)
+        correction = proposal.correction(trial, change, state.accuracy)
+        weights, layout = proposal.damping, proposal.system.structure.layout
+        sizes = [layout.member_sums(weights * part.square()) for part in (correction, change)]
+        moderate = (sizes[0] <= _LARGEST_CORRECTION**2 * sizes[1]).tolist()
+        if any(map(all, zip(bent, moderate, strict=True))):
+            trials.offer(change + correction, [b and m for b, m in zip(bent, moderate, strict=True)])
     # A reweighted model lies above the merit: with a gain of 1.5 its curvature is twice too large, and
     # the best step along the same line is twice as long.
     factors = [_extrapolation(gain) for gain in trials.gains]

@@ -34,7 +34,7 @@ class Trials:
         gains: For each member, by how much the merit falls at the best candidate so far, over what was promised;
             minus infinity while there is none.
         merits: Its merit.
-        reach: (members,) largest unknown at the start.
+        before: Merits of the start.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Trials:
         self._mixed = False
         self.merits = [course.merit for course in state.courses]
         self.gains = [-math.inf for _ in state.courses]
-        self.reach = problem.layout.member_largest(self._start.abs())
+        self.before = list(self.merits)
 
     def offer(self, change: Tensor, to: Sequence[bool] | None = None, *, again: bool = False) -> Evaluation | None:
         """Tries a step (N,); members for which it is the best so far take it.
@@ -82,6 +82,13 @@ class Trials:
             self._change, self._mixed = torch.where(chosen, change, self._change), True
             self.merits = [new if take else old for take, new, old in zip(takes, merits, self.merits, strict=True)]
         return trial
+
+    def is_short(self, proposal: Proposal) -> list[bool]:
+        """For each member, whether a step is below ``step_tolerance``, in units of stiffness."""
+        weights, layout = self._state.linearised.stiffness, self._problem.layout
+        sizes = [layout.member_sums(weights * part.square()) for part in (proposal.change, self._start)]
+        short: list[bool] = (sizes[0] <= self._state.settings.step_tolerance**2 * sizes[1]).tolist()
+        return short
 
     @property
     def taken(self) -> list[bool]:
