@@ -77,7 +77,7 @@ def repair(
     stay = ElementTerm(
         "stay", displacement, [("vertices", everyone)], data=(start,), weight=config.stay, loss=SmoothAbsolute(1e-3)
     )
-    near = closeness_terms(planes, topology.num_vertices, weight=config.closeness)
+    near = closeness_terms(planes, torch.arange(topology.num_vertices), weight=config.closeness)
     fixed = topology.is_boundary_vertex[:, None].expand(-1, 3)
     settings = ProjectionSettings(
         max_iterations=config.iterations, initial_damping=1e-2, damping_scale="identity", merit_tolerance=1e-5

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from torchfair.curves import ClosedCurve
 from torchfair.errors import MeshError, ShapeError
+from torchfair.geometry import SplineCurves
 
 TURN = 2.0 * math.pi
 
@@ -64,6 +65,30 @@ def test_corners_are_found_kept_and_sharp() -> None:
     assert float(on_side.max()) < 1e-12
 
 
+def test_spans_are_the_splines_of_a_curve_in_order() -> None:
+    """From the first corner on, with corners at both ends; one closed span where there are none."""
+    curve = square(corners=[1, 3, 6])
+    spans = curve.spans()
+    assert [(len(span.points), span.closed) for span in spans] == [(3, False), (4, False), (4, False)]
+    points = torch.cat([span.points[:-1] for span in spans])
+    torch.testing.assert_close(points, curve.at(curve.knots).roll(-1, 0), rtol=0, atol=1e-14)
+    splines = SplineCurves([span.points for span in spans], [False] * 3)
+    places = curve.at(torch.linspace(0, 1, 200, dtype=torch.float64))
+    distances = torch.stack([splines.closest(places, torch.full((200,), k)).distances for k in range(3)]).amin(0)
+    assert float(distances.max()) < 1e-12
+    (whole,) = circle(12).spans()
+    assert whole.closed
+    torch.testing.assert_close(whole.points, circle(12).at(circle(12).knots), rtol=0, atol=1e-14)
+
+
+def test_places_beside_the_curve_have_the_parameters_of_their_feet() -> None:
+    """Also beyond a corner, and nearer to another span than to that of their neighbours."""
+    curve = square()
+    points = torch.tensor([[1.3, -0.2, 0.5], [-1, -1, 0], [1.2, 1.9, 0], [2.5, 0.4, 0]], dtype=torch.float64)
+    expected = torch.tensor([1.3 / 8, 0.0, 4.8 / 8, 2.4 / 8], dtype=torch.float64)
+    torch.testing.assert_close(curve.parameters_of(points), expected, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("count", [4, 7, 20, 33])
 def test_spaced_parameters_hold_the_corners(count: int) -> None:
     curve = square(corners=[2, 4, 7])
@@ -82,8 +107,8 @@ def test_places_on_the_curve_are_found_again(parameters: list[float], cornered: 
     s = torch.tensor(parameters, dtype=torch.float64)
     again = curve.parameters_of(curve.at(s))
     gap = torch.remainder(again - s + 0.5, 1.0) - 0.5
-    assert float(gap.abs().max()) < 1e-3
-    assert float((curve.at(again) - curve.at(s)).norm(dim=1).max()) < 1e-3 * curve.length
+    assert float(gap.abs().max()) < 1e-9
+    assert float((curve.at(again) - curve.at(s)).norm(dim=1).max()) < 1e-9 * curve.length
 
 
 def test_a_function_with_corners() -> None:

@@ -204,12 +204,12 @@ class FairProblem:
         return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles, planar)
 
     def _boundary(self) -> list[ElementTerm]:
-        if self.boundary is None or self.boundary.feet is None:
+        if self.boundary is None:
             return []
-        return [
-            *c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight),
-            *c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight),
-        ]
+        fairness = c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight)
+        if self.boundary.feet is None:
+            return fairness
+        return [*c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight), *fairness]
 
     def _quality(self) -> list[ElementTerm]:
         settings = self.settings

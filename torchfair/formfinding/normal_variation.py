@@ -61,7 +61,8 @@ def minimise_normal_variation(
     Works on triangle, quad and hybrid polygon meshes, with or without boundary. Guarantees at every step:
     the merit never increases, nor does E above its start (unless handles, another reference or planarity
     ask for a different shape); no vertex goes farther from the reference surface than
-    ``settings.distance_limit``; no corner angle and no face area falls below its bound; no face flips. The
+    ``settings.distance_limit`` (gliding boundary vertices are on smooth curves through the boundary, which bulge over
+    its chords); no corner angle and no face area falls below its bound; no face flips. The
     problem is solved centred and with unit mean edge length, so results do not depend on the unit.
 
     Args:

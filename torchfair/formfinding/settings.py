@@ -26,13 +26,17 @@ class FairSettings:
 
     Attributes:
         energy_weight: Weight of E.
-        closeness_weight: Weight of the squared distance from the reference surface; 0 switches it off.
-        distance_limit: No vertex goes farther from the reference surface than this; None for no limit.
+        closeness_weight: Weight of the squared distance from the reference surface; 0 switches it off. A boundary
+            that glides is left to its curves.
+        distance_limit: No vertex goes farther from the reference surface than this, or on a boundary that glides
+            from its curve, which bulges over the chords; None for no limit.
         fairness_weight: Weight of squared second differences and umbrella vectors.
         handle_weight: Weight of the squared distance of handles from their targets.
-        boundary: ``"glide"`` lets boundary vertices slide on the boundary curve and keeps its corners,
-            ``"fixed"`` keeps them where they are, ``"free"`` leaves them to closeness alone.
-        boundary_weight: Weight of the squared distance from the boundary curve.
+        boundary: ``"glide"`` lets boundary vertices slide on smooth curves through all of them and keeps corners,
+            where curves end; ``"fixed"`` keeps them where they are, ``"free"`` leaves them to closeness alone. Between
+            two corners with no vertex between them the curve is straight.
+        boundary_weight: Weight of the squared distance from the boundary curves. In the result gliding vertices lie on
+            them exactly, but for those of faces that are kept planar.
         corner_angle: The boundary has a corner where it turns by more than this, radians.
         planar: ``"keep"`` for the polygons that arrive planar, ``"quads"`` for all polygons with more than
             three corners, ``"none"``, or face numbers.

@@ -7,9 +7,9 @@ from torch import Tensor
 
 from ._closest_boxes import BoxTree
 
-_TOP = 5  # depth at which searches start; all boxes of that depth are looked at
+_TOP = 6  # depth at which searches start; all boxes of that depth are looked at
 _STEP = 2  # levels taken at once on the way down
-_KEPT = 6  # boxes that are followed further
+_KEPT = 8  # boxes that are followed further
 
 
 class BoxDescent:
@@ -30,25 +30,26 @@ class BoxDescent:
 
         The item nearest to a point is among them unless more than k boxes, at some level, lie nearer than it.
         """
-        above = self._depths[0]
-        nodes = torch.arange(1 << above, device=points.device).expand(points.shape[1], -1)
+        nodes, above = None, 0
         for depth, boxes in zip(self._depths, self._levels, strict=True):
             children = torch.arange(1 << (depth - above), device=points.device)
-            nodes = ((nodes << (depth - above))[..., None] + children).flatten(1)
+            if nodes is None:  # all boxes at the top
+                nodes, sides = children.expand(points.shape[1], -1), [*boxes[:, None]]
+            else:
+                nodes = ((nodes << (depth - above))[..., None] + children).flatten(1)
+                sides = [side.index_select(0, nodes.reshape(-1)).view(nodes.shape) for side in boxes]
             if nodes.shape[1] > _KEPT:
-                nearest = _squared_gaps(boxes, nodes, points).topk(_KEPT, dim=1, largest=False, sorted=False)
+                nearest = _squared_gaps(sides, points).topk(_KEPT, dim=1, largest=False, sorted=False)
                 nodes = nodes.gather(1, nearest.indices)
             above = depth
         return self._items[nodes]
 
 
-def _squared_gaps(boxes: Tensor, nodes: Tensor, points: Tensor) -> Tensor:
-    """(N, k) squared distances of points (d, N) from the boxes (2 d, M) with numbers ``nodes`` (N, k), zero inside."""
-    low, high = boxes.chunk(2)
-    flat = nodes.reshape(-1)
-    total = torch.zeros(nodes.shape, dtype=points.dtype, device=points.device)
-    for place, least, most in zip(points[..., None], low, high, strict=True):
-        below, above = (side.index_select(0, flat).view(nodes.shape) for side in (least, most))
-        gap = torch.maximum(below - place, place - above).clamp_min_(0.0)
-        total.addcmul_(gap, gap)
+def _squared_gaps(sides: list[Tensor], points: Tensor) -> Tensor:
+    """(N, k) squared distances of points (d, N) from their boxes, zero inside: d low and d high sides (N or 1, k)."""
+    half = len(points)
+    total = torch.zeros((), dtype=points.dtype, device=points.device)
+    for place, least, most in zip(points[..., None], sides[:half], sides[half:], strict=True):
+        gap = torch.maximum(least - place, place - most).clamp_min_(0.0)
+        total = torch.addcmul(total, gap, gap)
     return total

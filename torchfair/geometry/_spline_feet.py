@@ -7,14 +7,15 @@ from torch import Tensor
 
 from ._ops import dot, gather
 
-_ARCS = 4  # of a segment, of which the nearest is searched
-_STEPS = 7
+_ARCS = 8  # of a segment, of which the nearest is searched
+_STEPS = 6
+_ROUNDING = 1e-14
 
 
 class SegmentFeet:
     """Nearest places on cubic segments ``a0 + a1 u + a2 u^2 + a3 u^3``, 0 <= u <= 1.
 
-    Half the derivative of the squared distance is a polynomial of fifth degree in u. Its values at the ends of four
+    Half the derivative of the squared distance is a polynomial of fifth degree in u. Its values at the ends of eight
     arcs choose one of them, on which it changes its sign; there its root is found by Newton steps, by bisection where
     they lead out of the bracket. Where the distance falls up to an end of the segment, that is the answer.
 
@@ -37,11 +38,15 @@ class SegmentFeet:
         away = gather(self._places, segments) - points[:, None]
         derivatives = gather(self._derivatives.flatten(1), segments).view(*segments.shape, 3, 3)
         beside = (derivatives @ away[..., None]).squeeze(-1)
-        slopes = gather(self._slopes, segments) + torch.nn.functional.pad(beside, (0, 3))
+        whole = gather(self._slopes, segments) + torch.nn.functional.pad(beside, (0, 3))
         base = dot(away, away)
-        low, high = self._bracket(slopes, base)
-        u = self._root(slopes.unbind(-1), low, high)
-        return u, base + 2.0 * _integral(slopes.unbind(-1), u), _horner(slopes.unbind(-1), u)
+        low, high = self._bracket(whole, base)
+        slopes = [part.contiguous() for part in whole.unbind(-1)]
+        u = self._root(slopes, low, high)
+        # Not by the polynomial of squared distances: near the curve that would be all rounding.
+        terms = [part / number for number, part in enumerate(derivatives.unbind(-2), 1)]
+        offset = _polynomial([away, *terms], u[..., None])
+        return u, dot(offset, offset), _polynomial(slopes, u)
 
     def _bracket(self, slopes: Tensor, base: Tensor) -> tuple[Tensor, Tensor]:
         """Ends of the arc that goes down from the best of the samples; both are an end of the segment if none does."""
@@ -52,28 +57,26 @@ class SegmentFeet:
         high = (best + falls.long()).clamp_max(_ARCS)
         return self._ends[low.squeeze(-1)], self._ends[high.squeeze(-1)]
 
-    def _root(self, slopes: tuple[Tensor, ...], low: Tensor, high: Tensor) -> Tensor:
+    def _root(self, slopes: list[Tensor], low: Tensor, high: Tensor) -> Tensor:
         """Where the slope becomes zero from below between ``low`` and ``high``."""
-        at_low, at_high = _horner(slopes, low), _horner(slopes, high)
-        rise = at_high - at_low
-        u = torch.where(rise > 0.0, low - at_low * (high - low) / rise, 0.5 * (low + high)).clamp(low, high)
+        rises = [number * part for number, part in enumerate(slopes)][1:]
+        at_low, at_high = _polynomial(slopes, low), _polynomial(slopes, high)
+        secant = low - at_low * (high - low) / (at_high - at_low)
+        u = torch.where(at_high > at_low, secant.clamp(low, high), 0.5 * (low + high))
         for _ in range(_STEPS):
-            value, rise = _horner(slopes, u), _rise(slopes, u)
-            low, high = torch.where(value < 0.0, u, low), torch.where(value < 0.0, high, u)
+            value, rise = _polynomial(slopes, u), _polynomial(rises, u)
+            falls = value < 0.0
+            low, high = torch.where(falls, u, low), torch.where(falls, high, u)
             step = u - value / rise
             inside = (rise > 0.0) & (step >= low) & (step <= high)
             u = torch.where(inside, step, 0.5 * (low + high))
-        return u
+        u = torch.where(u < _ROUNDING, 0.0, u)
+        return torch.where(u > 1.0 - _ROUNDING, 1.0, u)
 
 
-def _horner(f: tuple[Tensor, ...], u: Tensor) -> Tensor:
-    return f[0] + u * (f[1] + u * (f[2] + u * (f[3] + u * (f[4] + u * f[5]))))
-
-
-def _rise(f: tuple[Tensor, ...], u: Tensor) -> Tensor:
-    return f[1] + u * (2.0 * f[2] + u * (3.0 * f[3] + u * (4.0 * f[4] + u * (5.0 * f[5]))))
-
-
-def _integral(f: tuple[Tensor, ...], u: Tensor) -> Tensor:
-    parts = f[3] / 4.0 + u * (f[4] / 5.0 + u * f[5] / 6.0)
-    return u * (f[0] + u * (f[1] / 2.0 + u * (f[2] / 3.0 + u * parts)))
+def _polynomial(coefficients: list[Tensor], u: Tensor) -> Tensor:
+    """Horner's rule, lowest power first."""
+    value = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        value = torch.addcmul(coefficient, value, u)
+    return value

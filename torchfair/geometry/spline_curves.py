@@ -95,11 +95,11 @@ class SplineCurves:
         level = APART * knots.curves[None]
         corners = (np.concatenate([pick(hulls, axis=1).T, level]) for pick in (np.min, np.max))
         self._descent = BoxDescent(BoxTree(*corners), device)
-        self._curves = torch.from_numpy(knots.curves).to(device)
         self._coefficients = torch.from_numpy(coefficients).to(device)
         self._feet = SegmentFeet(self._coefficients)
         self._ends = torch.from_numpy(knots.ends).to(device)
-        self._is_first, self._is_last = (torch.from_numpy(x).to(device) for x in (knots.is_first, knots.is_last))
+        labels = knots.curves, knots.is_first, knots.is_last
+        self._labels = [torch.from_numpy(label).to(device) for label in labels]
         self._first = torch.from_numpy(np.searchsorted(knots.curves, np.arange(len(points)))).to(device)
 
     def at(self, curves: Tensor, segments: Tensor, fractions: Tensor) -> Tensor:
@@ -109,13 +109,12 @@ class SplineCurves:
     def closest(self, points: Tensor, curves: Tensor) -> SplineFeet:
         """Closest point of each of ``points`` (N, 3) on its own curve, number ``curves`` (N,).
 
-        Exact to rounding, computed in float64; the given points of a curve have distance 0. Each point is treated alike
-        whatever the others are. On segments whose curvature is so strong that a point has several feet on an eighth of
-        a segment, or where more than four stretches of a curve pass about as near, it may be another foot than the
-        nearest.
+        Exact to rounding, computed in float64; the given points of a curve have distance 0. The answer is a foot, but
+        it may not be the nearest one of a point that has about equally near ones on more than eight segments, or
+        several on an eighth of one: so far away are points near centres of curvature. It depends on the point alone.
 
-        All operations are those of torch on the device of the curves, without synchronisation: sizes depend on sizes
-        only. Coordinates are not checked; those that are not finite give answers that are not.
+        All operations are those of torch on the device of the curves, and their sizes depend on sizes only. So nothing
+        is checked: coordinates that are not finite give distances that are not.
 
         Raises:
             ShapeError: if ``points`` is not a floating tensor (N, 3) or ``curves`` not an integer tensor (N,).
@@ -135,16 +134,16 @@ class SplineCurves:
         level = APART * curves[None].to(points.dtype)
         segments = self._descent.candidates(torch.cat([points.T, level]))
         u, squared, slopes = self._feet.nearest(points, segments)
-        early, late = (u <= 0.0) & (slopes > 0.0), (u >= 1.0) & (slopes < 0.0)
+        flat = segments.reshape(-1)
+        owner, is_first, is_last = (label.index_select(0, flat).view(segments.shape) for label in self._labels)
+        early, late = (u == 0.0) & (slopes > 0.0), (u == 1.0) & (slopes < 0.0)
         # Where the distance falls on across an end of a segment, the foot is on the next one.
-        passing = (early & ~self._is_first[segments]) | (late & ~self._is_last[segments])
-        squared = torch.where(passing, 4.0 * squared, squared)
-        mine = self._curves[segments] == curves[:, None]
-        best = torch.where(mine, squared, torch.inf).argmin(1, keepdim=True)
-        segment, u, slope = (x.gather(1, best).squeeze(1) for x in (segments, u, slopes))
+        passed = (early & ~is_first) | (late & ~is_last)
+        order = torch.where(owner == curves[:, None], torch.where(passed, 4.0 * squared, squared), torch.inf)
+        best = order.argmin(1, keepdim=True)
+        segment, u, slope, at_end = (x.gather(1, best)[:, 0] for x in (segments, u, slopes, early | late))
         foot, tangent, curvature, speed = self._frame(segment, u)
-        beyond = slope.abs() > _BEYOND * speed.square()
-        beyond = beyond & (((u <= 0.0) & self._is_first[segment]) | ((u >= 1.0) & self._is_last[segment]))
+        beyond = at_end & (slope.abs() > _BEYOND * speed.square())
         distance = torch.linalg.vector_norm(points - foot, dim=1)
         return SplineFeet(foot, distance, segment - self._first[curves], u, tangent, curvature, beyond)
 
