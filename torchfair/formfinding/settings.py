@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+from .._numbers import check_number
+from ..errors import SettingsError
 from ..projection import ProjectionSettings
 from .checks import check_choice, check_weights
 
@@ -71,9 +73,9 @@ class FairSettings:
         check_choice(self, "formulation", FORMULATIONS)
         check_weights(self)
         if isinstance(self.planar, str) and self.planar not in PLANAR:
-            raise ValueError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
-        if self.distance_limit is not None and not self.distance_limit > 0.0:
-            raise ValueError(f"distance_limit must be positive or None, got {self.distance_limit}")
+            raise SettingsError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
+        if self.distance_limit is not None:
+            check_number("distance_limit (or None)", self.distance_limit, above=True)
 
     def stage(self) -> ProjectionSettings:
         """Settings of a stage before the last: fewer steps, wider tolerance."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 import copy
 
 import torch
+from torch import Tensor
 
 from ..errors import ShapeError
+from .derivative_check import check_derivative
 from .layout import Layout
-from .term import ElementTerm
+from .term import ElementTerm, Residual
 
 
 class CompiledTerm:
@@ -18,10 +20,13 @@ class CompiledTerm:
         unknowns: (K, n) flat number of each unknown of each element.
         nodes: (k, n) node number of each row of the stencil, all blocks together.
         widths: number of unknowns of each of the k rows.
+        verified: residual and closed form of a term on this stencil that were found to fit each other, see
+            :meth:`verify`.
     """
 
     def __init__(self, term: ElementTerm, layout: Layout) -> None:
         self.term = term
+        self.verified: tuple[Residual, Residual] | None = None
         unknowns, nodes, self.widths = [], [], []
         for name, index in term.stencil:
             width = layout.sizes[name][1]
@@ -32,6 +37,13 @@ class CompiledTerm:
             self.widths += [width] * index.shape[1]
         self.unknowns = torch.cat(unknowns, dim=1).T.contiguous()
         self.nodes = torch.cat(nodes, dim=1).T.contiguous()
+
+    def verify(self, arguments: tuple[Tensor, ...]) -> None:
+        """Checks a closed form against the residual at a few elements; once, also for later data and weights."""
+        term = self.term
+        if term.jacobian is not None and self.verified != (term.residual, term.jacobian):
+            check_derivative(term, arguments)
+            self.verified = (term.residual, term.jacobian)
 
     def with_term(self, term: ElementTerm) -> CompiledTerm:
         """The same numbers for a term on the same stencil."""

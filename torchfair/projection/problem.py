@@ -6,10 +6,12 @@ import copy
 from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
+import torch
 from torch import Tensor
 
 from ..errors import ShapeError
 from ..linear import LinearSolver, choose_solver
+from .checks import listed
 from .layout import Layout, State
 from .system import Structure
 from .term import ElementTerm
@@ -41,18 +43,11 @@ class Problem:
         fixed: Mapping[str, Tensor] | None = None,
         solver: str | LinearSolver = "auto",
     ) -> None:
-        if not blocks or not terms:
-            raise ShapeError("guided projection", "at least one block and one term", f"{len(blocks)} and {len(terms)}")
-        first = next(iter(blocks.values()))
-        for name, block in blocks.items():
-            if block.dtype != first.dtype or block.device != first.device:
-                raise ShapeError(
-                    f"block '{name}'", f"{first.dtype} on {first.device}", f"{block.dtype} on {block.device}"
-                )
-        self.terms = list(terms)
+        self.terms = listed(terms)
         self.layout = Layout.of(blocks)
-        free = self.layout.free_mask(fixed or {}, first.device)
-        self.structure = Structure(self.layout, self.terms, free, first.dtype)
+        free = self.layout.free_mask({} if fixed is None else fixed, self.layout.device)
+        with torch.no_grad():
+            self.structure = Structure(self.layout, self.terms, free, self.layout.dtype)
         self.solver = choose_solver(solver, self.structure) if isinstance(solver, str) else solver
 
     def with_terms(self: _Problem, terms: Sequence[ElementTerm]) -> _Problem:
@@ -65,16 +60,18 @@ class Problem:
             ShapeError: stencils differ, or other terms have elements and a weight.
         """
         result = copy.copy(self)
-        result.terms = list(terms)
-        result.structure = self.structure.with_terms(terms)
+        result.terms = listed(terms)
+        with torch.no_grad():
+            result.structure = self.structure.with_terms(result.terms)
         if not result.structure.shares_pattern(self.structure):
             result.solver = copy.copy(self.solver)  # each keeps the analysis of its own pattern
         return result
 
     def check_blocks(self, blocks: State) -> None:
-        """Raises ShapeError unless blocks have the sizes that the terms were compiled for."""
-        if Layout.of(blocks) != self.layout:
-            raise ShapeError("blocks", str(self.layout.sizes), str(Layout.of(blocks).sizes))
+        """Raises ShapeError unless blocks have sizes, dtype and device that the terms were compiled for."""
+        given = Layout.of(blocks)
+        if given != self.layout:
+            raise ShapeError("blocks", f"{self.layout} as compiled", str(given))
 
     def prepare(self) -> None:
         """Symbolic analysis; costs nothing where it is known."""

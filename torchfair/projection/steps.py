@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ..errors import SingularSystemError
 from .damping import Damping
-from .evaluate import check_start
+from .evaluate import check_linearised, check_start
 from .inequalities import Inequalities
 from .layout import State
 from .problem import Problem
@@ -48,6 +48,7 @@ def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = 
     evaluation = problem.structure.evaluate({name: block.detach().clone() for name, block in blocks.items()})
     check_start(problem.structure, evaluation)
     linearised = _linearise(problem, evaluation, settings)
+    check_linearised(problem.structure, linearised.system)
     return ProjectionState(evaluation, linearised, settings, Damping(settings.initial_damping), settings.accuracy)
 
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
-from ..errors import ShapeError
+from ..errors import ShapeError, TorchfairError
+from .checks import check_data, check_term
+from .element_function import checked, mapped
 from .layout import Layout, State
 from .loss import Loss, Squares, apply_root, is_one_sided
 
@@ -70,46 +72,32 @@ class ElementTerm:
 
     def check(self, layout: Layout) -> None:
         """Raises ShapeError unless stencil, data and weights fit each other and the blocks."""
-        what = f"term '{self.name}'"
-        if not self.stencil:
-            raise ShapeError(what, "a stencil with at least one block", "none")
-        for name, index in self.stencil:
-            if name not in layout.sizes:
-                raise ShapeError(what, f"blocks among {list(layout.sizes)}", f"'{name}'")
-            rows = layout.sizes[name][0]
-            if index.ndim != 2 or index.is_floating_point() or index.shape[0] != self.num_elements:
-                raise ShapeError(
-                    f"{what}, stencil of '{name}'", f"indices ({self.num_elements}, k)", tuple(index.shape)
-                )
-            if index.numel() and (int(index.min()) < 0 or int(index.max()) >= rows):
-                raise ShapeError(f"{what}, stencil of '{name}'", f"indices in 0..{rows - 1}", "indices outside")
-        for tensor in (*self.data, *(() if self.element_weights is None else (self.element_weights,))):
-            if tensor.shape[:1] != (self.num_elements,):
-                raise ShapeError(f"{what}, data", f"({self.num_elements}, ...)", tuple(tensor.shape))
-        if not self.weight >= 0.0:
-            raise ShapeError(f"{what}, weight", "a number of at least 0", self.weight)
-        if self.linear and (self.refresh is not None or not isinstance(self.loss, Squares) or self.merit is not None):
-            raise ShapeError(what, "a linear term with squares and without refresh or merit", "one of these")
-        if self.merit is not None and is_one_sided(self.loss):
-            raise ShapeError(what, "inequalities without a merit of their own", "one")
+        check_term(self, layout)
 
     def arguments(self, state: State) -> tuple[Tensor, ...]:
         """Arguments of :attr:`residual` for all elements at once: ``(n, k, d)`` locals, then the data."""
         local = tuple(state[name][index] for name, index in self.stencil)
-        data = self.data if self.refresh is None else self.refresh(state)
-        return (*local, *data)
+        data = self.data
+        if self.refresh is not None:
+            data = self.refresh(state)
+            what = f"what refresh of term '{self.name}' returns"
+            check_data(what, data, self.num_elements, local[0].dtype, local[0].device)
+        return (*local, *(tensor.detach() for tensor in data))
 
     def roots(self, residuals: Tensor) -> Tensor:
         """Square roots (n,) or (n, m, m) of all weights of the quadratic model made at residuals ``(n, m)``."""
         root = self.loss.root(residuals)
+        n, m = residuals.shape
+        if root.shape not in ((n,), (n, m, m)):
+            raise ShapeError(f"term '{self.name}', root of its loss", f"({n},) or ({n}, {m}, {m})", tuple(root.shape))
         weights = torch.full_like(residuals[:, 0], self.weight)
         if self.element_weights is not None:
-            weights = weights * self.element_weights
+            weights = weights * self.element_weights.detach()
         return apply_root(weights.sqrt(), root)
 
     def values(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Residuals ``(n, m)``."""
-        return as_rows(self._mapped(self.residual)(*arguments))
+        return as_rows(mapped(self, "residual")(*arguments))
 
     def missed(self, residuals: Tensor) -> Tensor:
         """Residuals ``(n, m)`` without what holds of inequalities."""
@@ -117,29 +105,35 @@ class ElementTerm:
 
     def contributions(self, arguments: tuple[Tensor, ...], residuals: Tensor) -> Tensor:
         """(n,) merit of every element."""
-        own = self.loss.value(residuals) if self.merit is None else self._mapped(self.merit)(*arguments)
+        if self.merit is None:
+            own = self.loss.value(residuals)
+            if own.shape != residuals.shape[:1]:
+                raise ShapeError(f"term '{self.name}', value of its loss", f"({len(residuals)},)", tuple(own.shape))
+        else:
+            own = mapped(self, "merit")(*arguments)
         value = self.weight * own
-        return value if self.element_weights is None else value * self.element_weights
+        return value if self.element_weights is None else value * self.element_weights.detach()
 
     def derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
         """Residuals ``(n, m)`` and Jacobians ``(n, m, K)``, K unknowns of the stencil in order."""
-        if self.jacobian is not None:
-            return self.values(arguments), self.jacobians(arguments)
-        return differentiate(self.residual, arguments, len(self.stencil), batched=self.batched)
+        if self.jacobian is None:
+            return self.automatic_derivatives(arguments)
+        values, closed = self.values(arguments), self.jacobians(arguments)
+        if closed.shape[:2] != values.shape:
+            what = f"({values.shape[1]}, {closed.shape[2]}) as residual and unknowns"
+            raise ShapeError(f"term '{self.name}', jacobian of an element", what, tuple(closed.shape[1:]))
+        return values, closed
+
+    def automatic_derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
+        """The same by differentiating :attr:`residual`, also where there is a closed form."""
+        return differentiate(checked(self, "residual"), arguments, len(self.stencil), batched=self.batched)
 
     def jacobians(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Jacobians ``(n, m, K)``."""
         if self.jacobian is None:
-            return self.derivatives(arguments)[1]
-        closed = self._mapped(self.jacobian)(*arguments)
+            return self.automatic_derivatives(arguments)[1]
+        closed = mapped(self, "jacobian")(*arguments)
         return closed if closed.ndim == 3 else closed[:, None]
-
-    def _mapped(self, function: Residual) -> Residual:
-        """A function of all elements at once."""
-        if self.batched:
-            return function
-        mapped: Residual = torch.func.vmap(function)
-        return mapped
 
 
 def as_rows(values: Tensor) -> Tensor:
@@ -156,6 +150,8 @@ def differentiate(
     holds that component's row of every element: reverse mode costs one sweep for each of the m components
     (and needs none of the machinery that ``jacrev`` imports, which takes seconds).
     """
+    if torch.is_inference_mode_enabled():
+        raise TorchfairError("derivatives are needed, which torch.inference_mode does not give: use torch.no_grad")
     local = [a.detach().requires_grad_() for a in arguments[:count]]
     with torch.enable_grad():
         values = as_rows((residual if batched else torch.func.vmap(residual))(*local, *arguments[count:]))
