@@ -36,5 +36,5 @@ def check_number(
 
 def check_count(name: str, value: object, *, least: int) -> None:
     """Raises SettingsError naming the setting unless it is a whole number of at least ``least``."""
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
+    if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:
         raise SettingsError(f"{name} must be a whole number of at least {least}, got {value!r}")

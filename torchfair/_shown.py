@@ -20,4 +20,5 @@ def shown(value: object) -> str:
         return repr(value)
     if isinstance(value, Sized) and not len(value):
         return f"an empty {type(value).__name__}"
-    return f"a {type(value).__name__}"
+    name = type(value).__name__
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"

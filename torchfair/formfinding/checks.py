@@ -45,6 +45,8 @@ def check_choice(settings: object, name: str, allowed: Sequence[str]) -> None:
 def check_weights(settings: object) -> None:
     """Raises SettingsError if a weight among the settings is no number, negative, infinite or NaN."""
     weights = {name: value for name, value in vars(settings).items() if name.endswith("_weight")}
-    wrong = [f"{name}={value!r}" for name, value in weights.items() if not (is_number(value) and 0.0 <= value < math.inf)]
+    wrong = [
+        f"{name}={value!r}" for name, value in weights.items() if not (is_number(value) and 0.0 <= value < math.inf)
+    ]
     if wrong:
         raise SettingsError(f"weights must be at least 0: {', '.join(wrong)}; give finite numbers")

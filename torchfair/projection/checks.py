@@ -91,7 +91,7 @@ def _check_stencil(what: str, stencil: object, layout: Layout) -> None:
         place = f"{what} of '{name}'"
         if not isinstance(index, Tensor) or index.dtype not in (torch.int64, torch.int32):
             raise ShapeError(place, "indices, a tensor of int64", shown(index))
-        if index.ndim != 2 or not index.shape[1] or index.shape[0] != (index.shape[0] if count is None else count):
+        if index.ndim != 2 or count not in (None, index.shape[0]):
             rows = "n" if count is None else count
             raise ShapeError(place, f"indices ({rows}, k), a row for each element", shown(index))
         count = index.shape[0]
@@ -104,7 +104,7 @@ def _check_range(place: str, index: Tensor, rows: int) -> None:
     if index.numel() and (int(index.min()) < 0 or int(index.max()) >= rows):
         element, entry = torch.nonzero((index < 0) | (index >= rows))[0].tolist()
         raise ShapeError(
-            place, f"indices in 0..{rows - 1}", f"{int(index[element, entry])} at [{element}, {entry}], indices outside"
+            place, f"indices in 0..{rows - 1}", f"{int(index[element, entry])} at [{element}, {entry}] (element, entry)"
         )
 
 
@@ -117,11 +117,11 @@ def _check_weights(what: str, term: ElementTerm, layout: Layout) -> None:
         return
     _check_rows(f"{what}, element_weights", weights, layout.dtype, layout.device)
     if tuple(weights.shape) != (term.num_elements,):
-        raise ShapeError(f"{what}, element_weights", f"data ({term.num_elements},)", shown(weights))
+        raise ShapeError(
+            f"{what}, element_weights", f"({term.num_elements},), a number for each element", shown(weights)
+        )
     bad = torch.nonzero(~((weights >= 0) & (weights < math.inf))).squeeze(1)
     if len(bad):
         first = bad[:_FIRST].tolist()
         given = f"{weights[bad[:_FIRST]].tolist()} at elements {first}"
         raise ShapeError(f"{what}, element_weights", "finite numbers of at least 0", given)
-
-

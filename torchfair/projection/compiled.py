@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError
-from .derivative_check import check_derivative
+from .declarations import check_declarations
 from .layout import Layout
 from .term import ElementTerm, Residual
 
@@ -20,13 +20,12 @@ class CompiledTerm:
         unknowns: (K, n) flat number of each unknown of each element.
         nodes: (k, n) node number of each row of the stencil, all blocks together.
         widths: number of unknowns of each of the k rows.
-        verified: residual and closed form of a term on this stencil that were found to fit each other, see
-            :meth:`verify`.
+        verified: functions of a term on this stencil that were found to be what it declares, see :meth:`verify`.
     """
 
     def __init__(self, term: ElementTerm, layout: Layout) -> None:
         self.term = term
-        self.verified: tuple[Residual, Residual] | None = None
+        self.verified: tuple[Residual, Residual | None, bool] | None = None
         unknowns, nodes, self.widths = [], [], []
         for name, index in term.stencil:
             width = layout.sizes[name][1]
@@ -39,11 +38,11 @@ class CompiledTerm:
         self.nodes = torch.cat(nodes, dim=1).T.contiguous()
 
     def verify(self, arguments: tuple[Tensor, ...]) -> None:
-        """Checks a closed form against the residual at a few elements; once, also for later data and weights."""
-        term = self.term
-        if term.jacobian is not None and self.verified != (term.residual, term.jacobian):
-            check_derivative(term, arguments)
-            self.verified = (term.residual, term.jacobian)
+        """Tries at a few elements what the term declares; once, also for later data, weights and losses."""
+        functions = (self.term.residual, self.term.jacobian, self.term.batched)
+        if self.verified != functions:
+            check_declarations(self.term, arguments)
+            self.verified = functions
 
     def with_term(self, term: ElementTerm) -> CompiledTerm:
         """The same numbers for a term on the same stencil."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import torch
-from torch import Tensor
 
 from ..errors import TorchfairError
+from .declarations import check_declarations
 from .layout import State
 from .loss import apply_root
 from .result import TermResidual
+from .start_checks import check_finite, check_merit, check_origin, first_bad_elements, rows
 from .system import Evaluation, LinearSystem, Structure
 from .term import ElementTerm
 
@@ -46,13 +47,6 @@ def residual_table(structure: Structure, terms: Sequence[ElementTerm], at: Evalu
     return rows
 
 
-def first_bad_elements(term: ElementTerm, state: State) -> list[int]:
-    """Elements whose residual or Jacobian is not finite."""
-    values, jacobians = term.derivatives(term.arguments(state))
-    bad = ~(torch.isfinite(values).all(1) & torch.isfinite(jacobians).flatten(1).all(1))
-    return [int(i) for i in torch.nonzero(bad).squeeze(1)]
-
-
 def check_start(structure: Structure, start: Evaluation) -> None:
     """Raises TorchfairError if the start or its merit is not finite, or a term is not what it is declared to be.
 
@@ -60,7 +54,7 @@ def check_start(structure: Structure, start: Evaluation) -> None:
     """
     state = start.state
     for name, block in state.items():
-        bad = _rows(~torch.isfinite(block))
+        bad = rows(~torch.isfinite(block))
         if bad:
             raise TorchfairError(f"block '{name}' is not finite in rows {bad[:5]}: repair the start")
     if start.merit != float("inf"):
@@ -71,59 +65,19 @@ def check_start(structure: Structure, start: Evaluation) -> None:
         for compiled, arguments, values in zip(structure.compiled, start.arguments, start.values, strict=True):
             compiled.verify(arguments)
             if start.merit < 0.0:
-                _check_merit(compiled.term, arguments, values)
+                check_merit(compiled.term, arguments, values)
+        for term in structure.terms:
+            if term.linear:
+                check_declarations(term, term.arguments(state))
         return
     for term in structure.terms:
         arguments = term.arguments(state)
         values = term.values(arguments)
-        _check_finite(term, arguments, values)
-        _check_merit(term, arguments, values)
+        check_finite(term, arguments, values)
+        check_merit(term, arguments, values)
         if term.linear:
-            _check_origin(structure, term)
+            check_origin(term, structure.layout)
     raise TorchfairError("the merit overflows at the start although every residual is finite: lower the weights")
-
-
-def _rows(bad: Tensor) -> list[int]:
-    """Rows of a bool tensor (n, ...) with a true entry."""
-    return [int(i) for i in torch.nonzero(bad.flatten(1).any(1)).squeeze(1)]
-
-
-def _check_finite(term: ElementTerm, arguments: tuple[Tensor, ...], values: Tensor) -> None:
-    bad = _rows(~torch.isfinite(values))
-    if not bad:
-        return
-    where = f"the residual of term '{term.name}' is not finite at the start, elements {bad[:5]}"
-    for i, data in enumerate(arguments[len(term.stencil) :]):
-        if not bool(torch.isfinite(data[bad]).all()):
-            raise TorchfairError(f"{where}: nor are its data[{i}] there, repair them or leave these elements out")
-    raise TorchfairError(f"{where}: move the start away from the singular place or leave these elements out")
-
-
-def _check_merit(term: ElementTerm, arguments: tuple[Tensor, ...], values: Tensor) -> None:
-    own = term.contributions(arguments, values)[:, None]
-    bad = _rows(~torch.isfinite(own))
-    if bad:
-        raise TorchfairError(
-            f"the merit of term '{term.name}' overflows at the start, elements {bad[:5]}, although its residual is "
-            "finite: lower its weight, or bring the start nearer"
-        )
-    bad = _rows(own < 0.0)
-    if bad:
-        raise TorchfairError(
-            f"the merit of term '{term.name}' is negative at the start, elements {bad[:5]}: add a constant, so that it "
-            "is never below zero"
-        )
-
-
-def _check_origin(structure: Structure, term: ElementTerm) -> None:
-    layout = structure.layout
-    origin = layout.unflatten(torch.zeros(layout.num_unknowns, dtype=layout.dtype, device=layout.device))
-    bad = first_bad_elements(term, origin)
-    if bad:
-        raise TorchfairError(
-            f"term '{term.name}' is declared linear, but not finite where its unknowns are zero, elements {bad[:5]}: "
-            "leave out linear=True"
-        )
 
 
 def check_linearised(structure: Structure, system: LinearSystem) -> None:
@@ -134,7 +88,7 @@ def check_linearised(structure: Structure, system: LinearSystem) -> None:
     if bool(torch.isfinite(system.gradient).all()):
         return
     for compiled, jacobians in zip(structure.compiled, system.jacobians, strict=True):
-        bad = torch.nonzero(~torch.isfinite(jacobians).flatten(0, 1).all(0)).squeeze(1).tolist()
+        bad = rows(~torch.isfinite(jacobians.permute(2, 0, 1)))
         if bad:
             raise TorchfairError(
                 f"the derivative of term '{compiled.term.name}' is not finite at the start, elements {bad[:5]}, "

@@ -41,8 +41,8 @@ class Layout:
             raise ShapeError("blocks", 'at least one, such as {"vertices": vertices}', shown(state))
         first = next(iter(state.values()))
         for name, block in state.items():
-            if not isinstance(block, Tensor) or block.ndim != 2 or not block.shape[1]:
-                raise ShapeError(f"block '{name}'", "a tensor (n, d), (n, 1) for one number each", shown(block))
+            if not isinstance(block, Tensor) or block.layout != torch.strided or block.ndim != 2 or not block.shape[1]:
+                raise ShapeError(f"block '{name}'", "a dense tensor (n, d), (n, 1) for one number each", shown(block))
             if block.dtype not in (torch.float32, torch.float64):
                 raise ShapeError(f"block '{name}'", "a tensor of float32 or float64", shown(block))
             if block.dtype != first.dtype or block.device != first.device:

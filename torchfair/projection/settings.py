@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .._numbers import check_count, check_number
+from .._shown import shown
 from ..errors import SettingsError
 from ..linear import LinearSolver
 
@@ -48,6 +49,15 @@ class ProjectionSettings:
     accuracy: float = 1e-2
     solver: str | LinearSolver = "auto"
 
+    @classmethod
+    def given(cls, settings: object) -> ProjectionSettings:
+        """Settings as given, or the defaults for None; SettingsError for anything else."""
+        if settings is None:
+            return cls()
+        if not isinstance(settings, cls):
+            raise SettingsError(f"settings must be ProjectionSettings(...) or None, got {shown(settings)}")
+        return settings
+
     def __post_init__(self) -> None:
         if self.damping_scale not in ("diagonal", "identity"):
             raise SettingsError(f"damping_scale must be 'diagonal' or 'identity', got {self.damping_scale!r}")
@@ -60,7 +70,9 @@ class ProjectionSettings:
         check_number("accuracy", self.accuracy, above=True, most=1.0)
         if self.time_limit is not None:
             check_number("time_limit", self.time_limit)
-        if not isinstance(self.solver, str) and (isinstance(self.solver, type) or not hasattr(self.solver, "factorise")):
+        if not isinstance(self.solver, str) and (
+            isinstance(self.solver, type) or not hasattr(self.solver, "factorise")
+        ):
             raise SettingsError(
                 f"solver must be the name of a linear solver or an object such as ScipyDirect(), got {self.solver!r}"
             )

@@ -31,25 +31,29 @@ class ElementTerm:
 
         ElementTerm("edge length", stretched, [("vertices", topology.edges)], data=(lengths,), weight=10.0)
 
+    Everything is in the dtype of the blocks and on their device. A solve is not differentiated through: data and
+    weights that require gradients are detached, silently.
+
     Attributes:
         name: Shown in the residual table; terms of one name are reported together.
         residual: The element function. It must be finite and differentiable where the solver goes; a value
             that is not finite rejects the step (this makes barriers possible).
-        stencil: ``(block name, (n, k) index tensor)`` pairs.
+        stencil: ``(block name, (n, k) index tensor)`` pairs; rows of the block, counted from 0.
         data: Tensors ``(n, ...)`` handed to the residual element by element, constant for derivatives.
         weight: Dimensionless weight of the term, at least 0.
-        element_weights: ``(n,)`` optional factors.
+        element_weights: ``(n,)`` optional factors, at least 0.
         loss: :class:`Squares`, :class:`SmoothAbsolute`, :class:`OneSided` for inequalities, or another :class:`Loss`.
         refresh: Called with every state that is evaluated; returns the ``data`` for that state (closest
-            points, frozen directions). The merit is therefore a function of the state alone.
+            points, frozen directions), a sequence. The merit is therefore a function of the state alone.
         merit: Element function with the same arguments that replaces the loss in the acceptance test, for
             reweighted targets whose residual is only a quadratic model; same gradient, never below zero.
         jacobian: Closed form of the derivative of the residual, ``(m, k_1 d_1 + k_2 d_2 + ...)`` or, for a
-            scalar residual, ``(k_1 d_1 + ...,)``; by default ``torch.func`` differentiates.
+            scalar residual, ``(k_1 d_1 + ...,)``; by default torch differentiates. At the first start it is compared
+            with that at a few elements, in float64 where the functions allow it; one that differs is an error.
         linear: The residual is affine in the state and has no refresh: differentiated only once.
         batched: :attr:`residual`, :attr:`merit` and :attr:`jacobian` take all n elements at once, ``(n, k, d)`` and
-            data ``(n, ...)``, and return results with n rows: faster where closed forms are written for it. Rows
-            must not depend on each other.
+            data ``(n, ...)``, and return results with n rows: faster where closed forms are written for it. They work
+            for any n; rows must not depend on each other.
     """
 
     name: str
@@ -80,7 +84,7 @@ class ElementTerm:
         data = self.data
         if self.refresh is not None:
             data = self.refresh(state)
-            what = f"what refresh of term '{self.name}' returns"
+            what = f"term '{self.name}', data that refresh returns"
             check_data(what, data, self.num_elements, local[0].dtype, local[0].device)
         return (*local, *(tensor.detach() for tensor in data))
 
@@ -126,7 +130,10 @@ class ElementTerm:
 
     def automatic_derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
         """The same by differentiating :attr:`residual`, also where there is a closed form."""
-        return differentiate(checked(self, "residual"), arguments, len(self.stencil), batched=self.batched)
+        if torch.is_inference_mode_enabled():
+            raise TorchfairError(f"term '{self.name}' is differentiated, but not in inference mode: use torch.no_grad")
+        function, what = checked(self, "residual"), f"the residual of term '{self.name}'"
+        return differentiate(function, arguments, len(self.stencil), batched=self.batched, what=what)
 
     def jacobians(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Jacobians ``(n, m, K)``."""
@@ -142,19 +149,30 @@ def as_rows(values: Tensor) -> Tensor:
 
 
 def differentiate(
-    residual: Residual, arguments: tuple[Tensor, ...], count: int, *, batched: bool = False
+    residual: Residual,
+    arguments: tuple[Tensor, ...],
+    count: int,
+    *,
+    batched: bool = False,
+    what: str = "the residual",
 ) -> tuple[Tensor, Tensor]:
     """Residuals ``(n, m)`` and Jacobians ``(n, m, K)`` with respect to the first ``count`` arguments.
 
     Elements do not depend on each other, so the gradient of the sum of one component over all elements
     holds that component's row of every element: reverse mode costs one sweep for each of the m components
     (and needs none of the machinery that ``jacrev`` imports, which takes seconds).
+
+    Raises:
+        TorchfairError: the residual does not depend on the first arguments; named ``what``.
     """
-    if torch.is_inference_mode_enabled():
-        raise TorchfairError("derivatives are needed, which torch.inference_mode does not give: use torch.no_grad")
     local = [a.detach().requires_grad_() for a in arguments[:count]]
     with torch.enable_grad():
         values = as_rows((residual if batched else torch.func.vmap(residual))(*local, *arguments[count:]))
+        if values.numel() and not values.requires_grad:
+            raise TorchfairError(
+                f"{what} does not depend on its unknowns in a way that torch can differentiate: leave out "
+                "detach(), comparisons and rounding, or the term"
+            )
         totals = values.sum(0).unbind() if values.requires_grad else ()
     outputs, inputs = values.shape[1], sum(a[0].numel() for a in local) if values.shape[0] else 0
     if outputs > inputs > 0:
