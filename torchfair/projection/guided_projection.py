@@ -52,7 +52,8 @@ def guided_projection(
         The best state found. Interrupting (Ctrl-C) returns it too, with ``Status.INTERRUPTED``.
 
     Raises:
-        ShapeError: blocks, terms or masks do not fit together, or a function of a term returns the wrong shape or dtype.
+        ShapeError: blocks, terms or masks do not fit together, or a function of a term returns something else
+            than a tensor of the right shape and dtype.
         SettingsError: unknown linear solver, or settings that are none.
         TorchfairError: a residual or Jacobian is not finite at the start; names the term and its elements. Likewise
             where a function of a term raises an error, which is its cause, a closed form is not the derivative, or a
