@@ -99,6 +99,29 @@ def test_another_subgradient_at_a_kink_is_no_mistake() -> None:
         guided_projection({"x": x}, [swapped], settings=settings)
 
 
+def test_rounding_beside_a_kink_is_no_mistake() -> None:
+    """The derivative of exp(3 log x) - x^3 is zero; by the chain rule it is 1e-14 or so."""
+
+    def nothing(x: Tensor) -> Tensor:
+        return torch.exp(3.0 * torch.log(x[0, 0])) - x[0, 0] ** 3
+
+    def both(x: Tensor) -> Tensor:
+        return torch.stack([torch.amax(x[0]), nothing(x)])
+
+    x = torch.linspace(1.1, 4.7, 8, dtype=DOUBLE)[:, None].expand(8, 2)
+    stencil = [("x", torch.arange(8)[:, None])]
+    alone = ElementTerm("nothing", nothing, stencil)
+    noise = alone.jacobians(alone.arguments({"x": x})).abs().max()
+    assert 0.0 < float(noise) < 1e-12
+
+    def by_hand(x: Tensor) -> Tensor:
+        ahead = (x[0, 0] >= x[0, 1]).to(x)
+        return torch.stack([torch.stack([ahead, 1.0 - ahead]), torch.zeros_like(x[0])])
+
+    closed = ElementTerm("both", both, stencil, jacobian=by_hand)
+    guided_projection({"x": x}, [closed], settings=ProjectionSettings(max_iterations=0))
+
+
 def test_what_torch_cannot_differentiate_is_no_verdict_on_a_closed_form() -> None:
     def outside(x: Tensor, lengths: Tensor) -> Tensor:
         return torch.from_numpy(all_stretched(x.detach(), lengths).numpy())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from torch import Tensor
 from torchfair import ShapeError, TorchfairError
 from torchfair.projection import (
     ElementTerm,
+    GuidedProjection,
     OneSided,
     SmoothAbsolute,
     SmoothNuclearNorm,
@@ -197,28 +199,57 @@ def test_derivatives_that_are_not_finite_later_end_the_run() -> None:
     assert "'steep', not finite at elements [0]" in result.message
 
 
+class Norm:
+    """A loss that forgets to sum over components."""
+
+    def __init__(self, part: str) -> None:
+        self.part = part
+
+    def value(self, residuals: Tensor) -> Tensor:
+        return 0.5 * (residuals.square() if self.part == "value" else residuals.square().sum(1))
+
+    def root(self, residuals: Tensor) -> Tensor:
+        return torch.ones_like(residuals if self.part == "root" else residuals[:, 0])
+
+
+@pytest.mark.parametrize(("part", "shape"), [("value", r"\(3,\)"), ("root", r"\(3,\) or \(3, 1, 1\)")])
+def test_losses_of_the_wrong_shape_are_named(part: str, shape: str) -> None:
+    with pytest.raises(ShapeError, match=rf"term 'bars', {part} of its loss: expected {shape}, got \(3, 1\)"):
+        solved(term(loss=Norm(part)))
+
+
 @pytest.mark.parametrize("linear", [False, True])
 def test_blocks_data_and_weights_that_require_gradients_are_detached(linear: bool) -> None:
     """Nothing of the solve is recorded: the result requires no gradient, and none arrives at the inputs."""
-    inputs = {
-        name: torch.nn.Parameter(value)
-        for name, value in {
-            "x": VERTICES.clone(),
-            "place": VERTICES + 1.0,
-            "weight": torch.ones(4, dtype=DOUBLE),
-        }.items()
-    }
+    values = {"x": VERTICES, "place": VERTICES + 1.0, "weight": torch.ones(4, dtype=DOUBLE)}
+    inputs = {name: value.clone().requires_grad_() for name, value in values.items()}
+    factor = torch.ones((), dtype=DOUBLE, requires_grad=True)  # not known to the term
     recorded: list[bool] = []
 
     def off(x: Tensor, place: Tensor) -> Tensor:
         recorded.append(place.requires_grad)
-        return (x[0] - place) * inputs["weight"].sum()
+        return (x[:, 0] - place) * factor
+
+    def scaled_identity(x: Tensor, place: Tensor) -> Tensor:
+        return (factor * torch.eye(3, dtype=DOUBLE)).expand(x.shape[0], 3, 3)
 
     row = torch.arange(4)[:, None]
-    one = ElementTerm("places", off, [("x", row)], (inputs["place"],), element_weights=inputs["weight"], linear=linear)
-    with torch.enable_grad():
-        result = guided_projection({"x": inputs["x"]}, [one])
-    assert result.blocks["x"].allclose(inputs["place"].detach())
-    assert not result.blocks["x"].requires_grad
+    one = ElementTerm(
+        "places",
+        off,
+        [("x", row)],
+        (inputs["place"],),
+        element_weights=inputs["weight"],
+        jacobian=scaled_identity,
+        linear=linear,
+        batched=True,
+    )
+    for terms in ([one], [replace(one, jacobian=None)]):
+        problem = GuidedProjection({"x": inputs["x"]}, terms)
+        for same in (problem, problem.with_terms(terms)):
+            result = same.solve({"x": inputs["x"]})
+            assert result.blocks["x"].allclose(values["place"])
+            assert not result.blocks["x"].requires_grad
+    assert recorded
     assert not any(recorded)
-    assert all(tensor.grad is None for tensor in inputs.values())
+    assert all(tensor.grad is None for tensor in (*inputs.values(), factor))

@@ -96,7 +96,7 @@ class ElementTerm:
             raise ShapeError(f"term '{self.name}', root of its loss", f"({n},) or ({n}, {m}, {m})", tuple(root.shape))
         weights = torch.full_like(residuals[:, 0], self.weight)
         if self.element_weights is not None:
-            weights = weights * self.element_weights.detach()
+            weights = weights * self.element_weights
         return apply_root(weights.sqrt(), root)
 
     def values(self, arguments: tuple[Tensor, ...]) -> Tensor:
@@ -116,7 +116,7 @@ class ElementTerm:
         else:
             own = mapped(self, "merit")(*arguments)
         value = self.weight * own
-        return value if self.element_weights is None else value * self.element_weights.detach()
+        return value if self.element_weights is None else value * self.element_weights
 
     def derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
         """Residuals ``(n, m)`` and Jacobians ``(n, m, K)``, K unknowns of the stencil in order."""
