@@ -36,6 +36,11 @@ def test_wrong_closed_forms_are_refused(mistake: str, dtype: torch.dtype) -> Non
 
     for one in (
         term(data=(LENGTHS.to(dtype),), jacobian=wrong),
+        term(
+            data=(LENGTHS.to(dtype),),
+            residual=lambda x, length: 1e3 * stretched(x, length),
+            jacobian=lambda x, length: 1e3 * wrong(x, length),
+        ),
         term(data=(LENGTHS.to(dtype),), residual=all_stretched, jacobian=batched, batched=True),
     ):
         with pytest.raises(TorchfairError, match=WORDS):
