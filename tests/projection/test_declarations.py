@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 import torch
-from bars import LENGTHS, VERTICES, all_derivatives, all_stretched, derivative, solved, term
+from bars import LENGTHS, VERTICES, all_derivatives, all_stretched, derivative, solved, stretched, term
 from helpers import DOUBLE, wavy_grid
 from torch import Tensor
 
