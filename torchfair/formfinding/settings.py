@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+from .._numbers import check_number
 from ..errors import SettingsError
 from ..projection import ProjectionSettings
 from .checks import check_choice, check_weights
@@ -78,11 +79,11 @@ class FairSettings:
         check_choice(self, "formulation", FORMULATIONS)
         check_weights(self)
         if isinstance(self.planar, str) and self.planar not in PLANAR:
-            raise ValueError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
+            raise SettingsError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
         if not all(1.0 < factor < math.inf for factor in self.continuation):
             raise SettingsError(f"continuation must hold finite factors above 1, got {self.continuation}")
-        if self.distance_limit is not None and not self.distance_limit > 0.0:
-            raise ValueError(f"distance_limit must be positive or None, got {self.distance_limit}")
+        if self.distance_limit is not None:
+            check_number("distance_limit (or None)", self.distance_limit, above=True)
 
     def stage(self) -> ProjectionSettings:
         """Settings of a stage before the last: fewer steps, wider tolerance."""
