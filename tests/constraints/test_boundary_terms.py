@@ -109,6 +109,26 @@ def test_bending_at_an_edge_is_its_length_times_the_sine(angle: float) -> None:
     assert bool(torch.isfinite(jacobians).all())
 
 
+@pytest.mark.parametrize("along", [False, True])
+@pytest.mark.parametrize("apart", [0.0, 35.0, 60.0, 110.0, 150.0])
+def test_bending_counts_against_the_plane_halfway_between_the_normals_of_both_ends(apart: float, along: bool) -> None:
+    """However the prescribed normals twist along an edge or around it, the plane in its middle is level here."""
+    tilt = math.radians(apart) / 2.0
+    ends = [[math.sin(a), 0.0, math.cos(a)] if along else [0.0, math.sin(a), math.cos(a)] for a in (tilt, -tilt)]
+    corners = torch.tensor([[0.0, 0, 0], [2, 0, 0], [0.7, math.cos(0.4), math.sin(0.4)]], dtype=torch.float64)
+    normals = torch.tensor([*ends, [0.0, 0.0, 0.0]], dtype=torch.float64)
+    (term,) = boundary_bending_terms(Topology.from_faces([[0, 1, 2]]), normals, smoothing=1e-9)
+    assert float(term.values(term.arguments({"vertices": corners})).abs()) == pytest.approx(2.0 * math.sin(0.4))
+
+
+@pytest.mark.parametrize("apart", [152.0, 180.0])
+def test_normals_that_nearly_oppose_each_other_have_no_plane_between_them(apart: float) -> None:
+    tilt = math.radians(apart) / 2.0
+    rows = [[math.sin(tilt), 0.0, math.cos(tilt)], [-math.sin(tilt), 0.0, math.cos(tilt)], [0.0, 0.0, 0.0]]
+    normals = torch.tensor(rows, dtype=torch.float64)
+    assert boundary_bending_terms(Topology.from_faces([[0, 1, 2]]), normals, smoothing=1e-9) == []
+
+
 def test_a_surface_that_meets_its_planes_has_no_bending_there() -> None:
     flat = VERTICES * torch.tensor([1.0, 1.0, 0.0], dtype=torch.float64)
     normals = torch.where(TOPOLOGY.is_boundary_vertex[:, None], UP, 0.0)
