@@ -186,6 +186,26 @@ def test_strips_too_long_for_the_sheet_are_halved() -> None:
         developable_strips(points, [line], normals, 0.5, sheet_width=1.4, gap=0.25)
 
 
+def straight(length: int) -> tuple[Tensor, list[Tensor], Tensor]:
+    """A line of edges of length 1 with upright normals: its strip is a rectangle."""
+    points = torch.stack([torch.arange(length + 1, dtype=DOUBLE), *torch.zeros(2, length + 1, dtype=DOUBLE)], dim=1)
+    return points, [torch.arange(length + 1)], torch.tensor([0.0, 0, 1], dtype=DOUBLE).expand(length + 1, 3)
+
+
+@pytest.mark.parametrize("room", [-0.01, 0.01, 0.3, 0.49, 0.51])
+def test_a_strip_stays_whole_exactly_if_there_is_a_gap_at_both_of_its_ends(room: float) -> None:
+    strips = developable_strips(*straight(32), 0.5, sheet_width=32.0 + room, gap=0.25)
+    assert strips.offsets.diff().tolist() == ([33] if room >= 0.5 else [17, 17])
+    if room < 0.5:  # two rows
+        assert strips.sheet == pytest.approx((32.0 + room, 2 * 0.5 + 3 * 0.25))
+
+
+def test_the_gap_is_a_quarter_of_the_width_of_the_strips_unless_given() -> None:
+    for gap, expected in ((None, (0.3 + 0.1) / 4), (0.0, 0.0), (0.7, 0.7)):
+        strips = developable_strips(*straight(5), 0.3, depth=0.1, gap=gap)
+        assert strips.sheet == pytest.approx((5.0 + 2.0 * expected, 0.4 + 2.0 * expected))
+
+
 def test_more_pieces_than_letters() -> None:
     points = torch.stack([torch.arange(61, dtype=DOUBLE), torch.zeros(61), torch.zeros(61)], dim=1)
     normals = torch.tensor([0.0, 0, 1], dtype=DOUBLE).expand(61, 3)
