@@ -216,12 +216,12 @@ def test_distance_limit_is_a_wall() -> None:
 def test_gliding_is_free_along_the_curve_and_stops_at_its_ends() -> None:
     line = torch.tensor([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]], dtype=DOUBLE)
     curves = ReferenceCurves([line], [False])
-    (term,) = constraints.gliding_terms(curves, torch.tensor([0, 1]), torch.zeros(2, dtype=torch.int64), weight=1.0)
-    points = torch.tensor([[0.7, 0.3, 0.4], [2.6, 0.8, 0.0]], dtype=DOUBLE)
+    (term,) = constraints.gliding_terms(curves, torch.arange(3), torch.zeros(3, dtype=torch.int64), weight=1.0)
+    points = torch.tensor([[0.7, 0.3, 0.4], [2.6, 0.8, 0.0], [-0.8, 0.0, 0.6]], dtype=DOUBLE)
     residuals, jacobians = term.derivatives(term.arguments({"vertices": points}))
-    assert torch.linalg.vector_norm(residuals, dim=1).allclose(torch.tensor([0.5, 1.0], dtype=DOUBLE))
+    assert torch.linalg.vector_norm(residuals, dim=1).allclose(torch.tensor([0.5, 1.0, 1.0], dtype=DOUBLE))
     assert (jacobians[0, :, 0].abs() < 1e-14).all()
-    assert jacobians[1].allclose(torch.eye(3, dtype=DOUBLE))
+    assert jacobians[1:].allclose(torch.eye(3, dtype=DOUBLE))
 
 
 def test_boundary_pieces_and_gliding_need_no_boundary() -> None:

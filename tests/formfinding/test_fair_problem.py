@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 from helpers import DOUBLE, grid_faces, split_quads
 from torch import Tensor
 
-from torchfair import Topology
+from torchfair import MeshError, Topology
 from torchfair.energies import normal_variation
 from torchfair.formfinding import FairSettings, minimise_normal_variation
 from torchfair.formfinding.fair_problem import FairProblem
@@ -65,6 +66,37 @@ def test_no_face_turns_over_whatever_is_asked_for() -> None:
     assert design.design_mode
     assert not design.admits(start, beyond)
     assert design.admits(beyond, beyond)  # far from the start only the last state says what is front
+
+
+def test_one_handle_that_leaves_the_surface_is_enough_for_design_mode() -> None:
+    """The farthest target counts, measured from the reference surface and not from the vertex."""
+    vertices, _ = bent_sheet()
+    along, away = torch.tensor([0.0, 0.3, 0.0], dtype=DOUBLE), torch.tensor([0.0, 0.0, 0.7], dtype=DOUBLE)
+    on, off = {11: vertices[11] + along}, {13: vertices[13] + away}
+    assert not problem(targets=on).design_mode
+    assert problem(targets=off).design_mode
+    assert problem(targets={**on, **off}).design_mode
+    assert not problem(targets=off, settings=FairSettings(distance_limit=None)).design_mode
+    assert not problem(targets=off, settings=FairSettings(distance_limit=1.0)).design_mode
+
+
+def test_auxiliary_variables_fit_their_constraints_at_every_start_of_a_stage() -> None:
+    vertices, _ = bent_sheet()
+    fair = problem(settings=FairSettings(formulation="lifted"))
+    moved_on = vertices + 0.1 * torch.randn(vertices.shape, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
+    lifted = [term for term in fair.terms(1.0) if any(name != "vertices" for name, _ in term.stencil)]
+    for place in (vertices, moved_on):
+        blocks = fair.blocks(place)
+        assert torch.equal(blocks["vertices"], place)
+        for term in lifted[:-1]:  # the last one is E
+            assert float(term.values(term.arguments(blocks)).abs().max()) < 1e-12
+
+
+def test_a_single_face_without_area_is_refused() -> None:
+    vertices = torch.tensor([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0]], dtype=DOUBLE)
+    topology = Topology.from_faces([[0, 1, 2], [1, 0, 3]])
+    with pytest.raises(MeshError, match=r"1 face\(s\) have no area: faces \[1\]"):
+        minimise_normal_variation(vertices, topology)
 
 
 def test_energy_stays_at_most_that_of_the_start_even_where_fairness_would_raise_it() -> None:

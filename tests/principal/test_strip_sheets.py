@@ -155,6 +155,19 @@ def test_shelves_hold_all_boxes(boxes: list[tuple[float, float]], gap: float, wi
     assert width is None or layout.width == width
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_sheet_without_a_given_width_is_the_smallest_of_those_from_square_to_twice_as_broad(seed: int) -> None:
+    sizes = np.random.default_rng(seed).uniform(0.2, 3.0, (30, 2))
+    gap = 0.1
+    chosen = shelves(sizes, gap, None)
+    square = math.sqrt(float((sizes + gap).prod(1).sum()))
+    narrowest = float(sizes[:, 0].max()) + 2 * gap
+    areas = [step * square / 8 * shelves(sizes, gap, max(narrowest, step * square / 8)).height for step in range(8, 17)]
+    assert chosen.width * chosen.height <= min(areas) * (1 + 1e-9)
+    assert chosen.width * chosen.height < max(areas)
+    assert chosen.width <= 2 * square
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_bounding_boxes_are_smallest(seed: int) -> None:
     flat = walk(seed)
