@@ -58,4 +58,5 @@ def side_determinants(points: Tensor, noise: Tensor | float) -> tuple[Tensor, Te
     noise = noise + 8 * torch.finfo(points.dtype).eps
     lengths = torch.linalg.vector_norm(steps.detach(), dim=-1)[..., :, None]
     distances = torch.linalg.vector_norm(offsets.detach(), dim=-1)
-    return determinants, noise * (lengths + distances + noise)
+    # A point that moves changes the determinant by the distance of the two others, to first order.
+    return determinants, noise * (lengths + distances + distances.roll(-1, -2) + 4 * noise)
