@@ -1,0 +1,137 @@
+"""A second device without a GPU: tensors that say that they are elsewhere, and keep their values here.
+
+Inside ``with PretendedDevice():`` tensors can be made on :data:`PRETENDED` or moved there. Everything works on them,
+set-up that depends on values included, and results can be compared with those of the CPU. An operation that meets a
+tensor of the CPU raises, as on a GPU; also where GPUs copy it silently (indices, single numbers).
+
+Inside ``with PretendedDevice(strict=True):`` only what runs on a GPU without the CPU waiting for it is allowed. An
+operation raises that makes a tensor on the CPU, be it to copy it over, or whose result depends on values: ``item``,
+``nonzero``, boolean masks as indices.
+
+Torch's own fake tensors carry no values, so they come to an end in such set-up, and where torch is built without CUDA
+they cannot be differentiated on a GPU that is not there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.utils._python_dispatch import TorchDispatchMode
+from torch.utils._pytree import tree_leaves, tree_map
+
+PRETENDED = torch.device("lazy", 0)
+"""A device that torch knows by name in every build, differentiates in the calling thread, and that nothing else uses."""
+
+_aten = torch.ops.aten
+_MOVES = {_aten._to_copy.default, _aten.copy_.default}
+_BY_VALUE = {torch.Tag.data_dependent_output, torch.Tag.dynamic_output_shape}
+_INDEXED = {_aten.index.Tensor, _aten.index_put_.default, _aten.index_put.default, _aten._index_put_impl_.default}
+
+
+class PretendedTensor(Tensor):
+    """A tensor on :data:`PRETENDED`.
+
+    Attributes:
+        here: The same on the CPU.
+    """
+
+    here: Tensor
+
+    @staticmethod
+    def __new__(cls, here: Tensor) -> PretendedTensor:
+        details: dict[str, Any] = {"dtype": here.dtype, "device": PRETENDED}
+        if here.layout == torch.strided:
+            details.update(strides=here.stride(), storage_offset=here.storage_offset())
+        else:
+            details.update(layout=here.layout)
+        made = Tensor._make_wrapper_subclass(cls, here.shape, **details)
+        made.here = here
+        return made
+
+    def tolist(self) -> Any:
+        return self.cpu().tolist()
+
+    def __repr__(self) -> str:
+        return f"pretended {self.here!r}"
+
+    @classmethod
+    def __torch_dispatch__(cls, operation: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        return _run(operation, args, kwargs or {}, strict=False)
+
+
+class PretendedDevice(TorchDispatchMode):
+    """See above. May be nested: the innermost says whether it is strict."""
+
+    def __init__(self, *, strict: bool = False) -> None:
+        super().__init__()
+        self.strict = strict
+
+    def __enter__(self) -> PretendedDevice:
+        self._before = torch._C._only_lift_cpu_tensors()
+        torch._C._set_only_lift_cpu_tensors(True)  # torch.tensor(...) asks before it copies to another device
+        super().__enter__()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        super().__exit__(*error)
+        torch._C._set_only_lift_cpu_tensors(self._before)
+
+    def __torch_dispatch__(self, operation: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        return _run(operation, args, kwargs or {}, self.strict)
+
+
+def _run(operation: Any, args: Any, kwargs: Any, strict: bool) -> Any:
+    tensors = [leaf for leaf in tree_leaves((args, kwargs)) if isinstance(leaf, Tensor)]
+    there = [tensor for tensor in tensors if isinstance(tensor, PretendedTensor)]
+    if operation is torch.ops.prim.device.default:
+        return PRETENDED if there else operation(*args)
+    asked = kwargs.get("device")
+    target = torch.device(asked) if asked is not None else PRETENDED if there else torch.device("cpu")
+    goes_there = target.type == PRETENDED.type
+    if len({type(tensor) is PretendedTensor for tensor in tensors}) > 1 and operation not in _MOVES:
+        raise RuntimeError(f"{operation}: tensors on two devices, {_shapes(tensors)}")
+    if strict and not (goes_there and len(there) == len(tensors)):
+        raise RuntimeError(f"{operation}: a tensor on the CPU, {_shapes(tensors)}")
+    if strict and _depends_on_values(operation, args):
+        raise RuntimeError(f"{operation}: waits for values, {_shapes(tensors)}")
+    if asked is not None and goes_there:
+        kwargs = {**kwargs, "device": torch.device("cpu")}
+    if operation is _aten._to_copy.default and len(there) == len(tensors) == 1 and not goes_there:
+        return operation(args[0].here, **kwargs)
+    result = operation(*tree_map(_here, args), **tree_map(_here, kwargs))
+    if operation._schema.is_mutable:
+        return _written(operation, args, kwargs)
+    return tree_map(_there, result) if goes_there else result
+
+
+def _depends_on_values(operation: Any, args: Any) -> bool:
+    if operation in _INDEXED:
+        return any(index is not None and index.dtype in (torch.bool, torch.uint8) for index in args[1])
+    return bool(_BY_VALUE & set(operation.tags))
+
+
+def _written(operation: Any, args: Any, kwargs: Any) -> Any:
+    """The arguments that an operation has written to, which are what it returns."""
+    schema = operation._schema
+    written = [
+        args[number] if number < len(args) else kwargs.get(argument.name)
+        for number, argument in enumerate(schema.arguments)
+        if argument.alias_info is not None and argument.alias_info.is_write
+    ]
+    if not schema.returns:
+        return None
+    return written[0] if len(schema.returns) == 1 else tuple(written)
+
+
+def _here(value: Any) -> Any:
+    return value.here if isinstance(value, PretendedTensor) else value
+
+
+def _there(value: Any) -> Any:
+    return PretendedTensor(value) if type(value) is Tensor else value
+
+
+def _shapes(tensors: list[Tensor]) -> str:
+    return ", ".join(f"{tuple(tensor.shape)} {tensor.dtype} on {tensor.device}" for tensor in tensors)
