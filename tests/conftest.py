@@ -17,7 +17,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--device",
         default="pretended",
-        help="where tests that ask for a device run: cuda, or another device of torch; by default one that is pretended",
+        help="of tests that ask for a device: cuda, or another one of torch; by default one that is pretended",
     )
 
 

@@ -18,11 +18,12 @@ from typing import Any
 
 import torch
 from torch import Tensor
+from torch.overrides import TorchFunctionMode
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves, tree_map
 
 PRETENDED = torch.device("lazy", 0)
-"""A device that torch knows by name in every build, differentiates in the calling thread, and that nothing else uses."""
+"""A device that every build of torch knows by name and differentiates in the calling thread; nobody else uses it."""
 
 _aten = torch.ops.aten
 _MOVES = {_aten._to_copy.default, _aten.copy_.default}
@@ -71,15 +72,28 @@ class PretendedDevice(TorchDispatchMode):
     def __enter__(self) -> PretendedDevice:
         self._before = torch._C._only_lift_cpu_tensors()
         torch._C._set_only_lift_cpu_tensors(True)  # torch.tensor(...) asks before it copies to another device
+        self._new_tensors = _NewTensors()
+        self._new_tensors.__enter__()
         super().__enter__()
         return self
 
     def __exit__(self, *error: object) -> None:
         super().__exit__(*error)
+        self._new_tensors.__exit__(*error)
         torch._C._set_only_lift_cpu_tensors(self._before)
 
     def __torch_dispatch__(self, operation: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
         return _run(operation, args, kwargs or {}, self.strict)
+
+
+class _NewTensors(TorchFunctionMode):
+    """``x.new_tensor(...)``, which does not find the device of ``x`` inside torch.func."""
+
+    def __torch_function__(self, function: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        if function is Tensor.new_tensor:
+            like, data = args
+            return torch.tensor(data, **{"dtype": like.dtype, "device": like.device, **(kwargs or {})})
+        return function(*args, **(kwargs or {}))
 
 
 def _run(operation: Any, args: Any, kwargs: Any, strict: bool) -> Any:

@@ -41,7 +41,7 @@ def side_curvatures(x: Tensor) -> tuple[Tensor, Tensor]:
     """
     spokes = x[:, 1:] - x[:, :1]
     principal = spokes[:, ::3]
-    sphere = spheres_through(x[:, 0], _cospherical(x[:, 1:]))
+    sphere = spheres_through(x[:, 0], _cospherical(x[:, 1:]).flatten(1, 2))
     faces = unit(cross(spokes[:, 1::3], spokes[:, 2::3]))
     normals = torch.cat([sphere.normals[:, None], faces], dim=1)
     heights = dot(normals[:, :, None], principal[:, None])
@@ -52,7 +52,7 @@ def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
     """Derivatives (n, 6, 6, 3) and (n, 6, 3) of both results of :func:`side_curvatures` by the spokes."""
     spokes = x[:, 1:] - x[:, :1]
     principal = spokes[:, ::3]
-    sphere = spheres_through(x[:, 0], _cospherical(x[:, 1:]))
+    sphere = spheres_through(x[:, 0], _cospherical(x[:, 1:]).flatten(1, 2))
     a, b = spokes[:, 1::3], spokes[:, 2::3]
     products = cross(a, b)
     faces = unit(products)
@@ -65,8 +65,8 @@ def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
         result[:, :, number, spoke] = (
             2.0 * normals / squares[:, number, None] - sides[..., number, None] * by_normal[:, number, None]
         )
-    by_sphere, by_curvature = sphere_derivatives(_cospherical(spokes), sphere.normals, by_normal)
-    _halves(result[:, 0])[..., 1:, :] = by_sphere.unflatten(-2, (2, 2))
+    by_sphere, by_curvature = sphere_derivatives(_cospherical(spokes).flatten(1, 2), sphere.normals, by_normal)
+    _cospherical(result[:, 0]).copy_(by_sphere.view(x.shape[0], 2, 2, 2, 3))
     lengths = norm(products)[..., None]
     inverse = torch.where(lengths > 0, 1.0 / torch.where(lengths > 0, lengths, 1.0), 0.0)
     for face, (first, second) in enumerate(((1, 2), (4, 5))):
@@ -75,18 +75,13 @@ def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
         result[:, 1 + face, :, first] += cross(b[:, face, None], turned)
         result[:, 1 + face, :, second] += cross(turned, a[:, face, None])
     curvature = x.new_zeros(x.shape[0], 6, 3)
-    _halves(curvature)[..., 1:, :] = by_curvature.unflatten(-2, (2, 2))
+    _cospherical(curvature).copy_(by_curvature.view(x.shape[0], 2, 2, 3))
     return result.flatten(1, 2), curvature
 
 
-def _halves(around: Tensor) -> Tensor:
-    """w1, w2, w3 and w4, w5, w6 (..., 2, 3, 3) of w1, ..., w6 (..., 6, 3): a view.
-
-    Lists as indices would be made tensors and copied to the device at every call.
-    """
-    return around.unflatten(-2, (2, 3))
-
-
 def _cospherical(around: Tensor) -> Tensor:
-    """w2, w3, w5, w6 (..., 4, 3) of w1, ..., w6 (..., 6, 3)."""
-    return _halves(around)[..., 1:, :].flatten(-3, -2)
+    """w2, w3 and w5, w6 (..., 2, 2, 3) of w1, ..., w6 (..., 6, 3): a view.
+
+    A list for an index would be made a tensor and copied to the device at every call.
+    """
+    return around.view(*around.shape[:-2], 2, 3, 3)[..., 1:, :]
