@@ -14,13 +14,13 @@ they cannot be differentiated on a GPU that is not there.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import torch
 from torch import Tensor
 from torch.overrides import TorchFunctionMode
 from torch.utils._python_dispatch import TorchDispatchMode
-from torch.utils._pytree import tree_leaves, tree_map
 
 PRETENDED = torch.device("lazy", 0)
 """A device that every build of torch knows by name and differentiates in the calling thread; nobody else uses it."""
@@ -97,7 +97,7 @@ class _NewTensors(TorchFunctionMode):
 
 
 def _run(operation: Any, args: Any, kwargs: Any, strict: bool) -> Any:
-    tensors = [leaf for leaf in tree_leaves((args, kwargs)) if isinstance(leaf, Tensor)]
+    tensors = [*_tensors(args), *_tensors(kwargs.values())]
     there = [tensor for tensor in tensors if isinstance(tensor, PretendedTensor)]
     if operation is torch.ops.prim.device.default:
         return PRETENDED if there else operation(*args)
@@ -114,10 +114,10 @@ def _run(operation: Any, args: Any, kwargs: Any, strict: bool) -> Any:
         kwargs = {**kwargs, "device": torch.device("cpu")}
     if operation is _aten._to_copy.default and len(there) == len(tensors) == 1 and not goes_there:
         return operation(args[0].here, **kwargs)
-    result = operation(*tree_map(_here, args), **tree_map(_here, kwargs))
+    result = operation(*_mapped(_here, args), **{name: _mapped(_here, value) for name, value in kwargs.items()})
     if operation._schema.is_mutable:
         return _written(operation, args, kwargs)
-    return tree_map(_there, result) if goes_there else result
+    return _mapped(_there, result) if goes_there else result
 
 
 def _depends_on_values(operation: Any, args: Any) -> bool:
@@ -137,6 +137,18 @@ def _written(operation: Any, args: Any, kwargs: Any) -> Any:
     if not schema.returns:
         return None
     return written[0] if len(schema.returns) == 1 else tuple(written)
+
+
+def _tensors(values: Iterable[Any]) -> Iterator[Tensor]:
+    for value in values:
+        if isinstance(value, Tensor):
+            yield value
+        elif isinstance(value, (list, tuple)):
+            yield from _tensors(value)
+
+
+def _mapped(function: Callable[[Any], Any], value: Any) -> Any:
+    return type(value)([_mapped(function, v) for v in value]) if type(value) in (list, tuple) else function(value)
 
 
 def _here(value: Any) -> Any:

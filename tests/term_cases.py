@@ -42,7 +42,7 @@ CASES: dict[str, Callable[[torch.device], list[Case]]] = {}
 
 def triangles(device: torch.device) -> Mesh:
     """In generic position, with boundary."""
-    vertices, topology = wavy_grid(6, 6, triangles=True)
+    vertices, topology = wavy_grid(5, 5, triangles=True)
     return vertices.to(device), topology.to(device)
 
 
@@ -54,7 +54,7 @@ def mixed(device: torch.device) -> Mesh:
 
 def smooth(device: torch.device) -> Mesh:
     """A quadratic height field."""
-    vertices, topology = wavy_grid(6, 6, triangles=True)
+    vertices, topology = wavy_grid(5, 5, triangles=True)
     vertices[:, 2] = 0.02 * vertices[:, 0] ** 2 - 0.03 * vertices[:, 0] * vertices[:, 1]
     return vertices.to(device), topology.to(device)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable, Iterator
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
 
 import pytest
 import torch
@@ -21,9 +21,9 @@ from torchfair.projection.loss import apply_root
 
 CPU = torch.device("cpu")
 
-UPLOADING = {"lifted_absolute_curvature_terms": ("evaluate", "weigh"), "absolute_curvature_terms": ("weigh",),
-             "along_directions": ("weigh",)}  # fmt: skip
-"""Where the six components of symmetric matrices are made: constants that are copied from the CPU at every call."""
+UPLOADING_RESIDUALS = {"lifted_absolute_curvature_terms"}
+UPLOADING_LOSSES = {"absolute_curvature_terms", "along_directions"}
+"""Where symmetric matrices are made of their six components: constants are copied from the CPU at every call."""
 
 
 def makers_of_terms() -> Iterator[str]:
@@ -43,41 +43,42 @@ def test_there_is_a_problem_for_every_public_function_that_makes_terms() -> None
     assert set(makers_of_terms()) == set(CASES)
 
 
-def evaluate(term: ElementTerm, state: State) -> dict[str, Tensor]:
+@pytest.mark.parametrize("name", CASES)
+def test_terms_are_the_same_on_another_device_and_do_not_wait_for_it(name: str, device: torch.device) -> None:
+    for (state, terms), (state_there, terms_there) in zip(CASES[name](CPU), CASES[name](device), strict=True):
+        assert len(terms) == len(terms_there) > 0
+        for term, there in zip(terms, terms_there, strict=True):
+            assert term.num_elements > 0
+            assert all(index.device == device for _, index in there.stencil)
+            with _strictly(device, name not in UPLOADING_RESIDUALS):
+                found = _linearised(there, state_there)
+            with _strictly(device, name not in UPLOADING_LOSSES):
+                found |= _weighed(there, found)
+            expected = _linearised(term, state)
+            for key, value in (expected | _weighed(term, expected)).items():
+                assert found[key].device == device, key
+                torch.testing.assert_close(found[key].cpu(), value, msg=lambda text, key=key: f"{key}: {text}")
+
+
+def _strictly(device: torch.device, chosen: bool) -> AbstractContextManager[object]:
+    return PretendedDevice(strict=True) if chosen and device == PRETENDED else nullcontext()
+
+
+def _linearised(term: ElementTerm, state: State) -> dict[str, Tensor]:
     """What the solver asks of a term at every step."""
     arguments = term.arguments(state)
-    named = {f"argument {number}": argument for number, argument in enumerate(arguments)}
+    named = {str(number): argument for number, argument in enumerate(arguments)}
     return {**named, "values": term.values(arguments), "jacobians": term.jacobians(arguments)}
 
 
-def weigh(term: ElementTerm, state: State) -> dict[str, Tensor]:
+def _weighed(term: ElementTerm, found: dict[str, Tensor]) -> dict[str, Tensor]:
     """What the solver makes of that."""
-    arguments = term.arguments(state)
-    values, jacobians = term.derivatives(arguments)
+    values, arguments = found["values"], tuple(value for key, value in found.items() if key.isdigit())
     root = term.roots(values)
     return {
         "missed": term.missed(values),
         "contributions": term.contributions(arguments, values),
         "roots": root,
         "scaled residuals": apply_root(root, values),
-        "scaled jacobians": apply_root(root, jacobians),
+        "scaled jacobians": apply_root(root, found["jacobians"]),
     }
-
-
-@pytest.mark.parametrize("step", [evaluate, weigh])
-@pytest.mark.parametrize("name", CASES)
-def test_terms_are_the_same_on_another_device_and_do_not_wait_for_it(
-    name: str, step: Callable[[ElementTerm, State], dict[str, Tensor]], device: torch.device
-) -> None:
-    strictly = device == PRETENDED and step.__name__ not in UPLOADING.get(name, ())
-    for (state, terms), (state_there, terms_there) in zip(CASES[name](CPU), CASES[name](device), strict=True):
-        assert len(terms) == len(terms_there) > 0
-        for term, there in zip(terms, terms_there, strict=True):
-            assert term.num_elements > 0
-            tables = [index for _, index in there.stencil] + [x for x in (there.element_weights,) if x is not None]
-            assert all(table.device == device for table in tables)
-            with PretendedDevice(strict=True) if strictly else nullcontext():
-                found = step(there, state_there)
-            for key, expected in step(term, state).items():
-                assert found[key].device == device, key
-                torch.testing.assert_close(found[key].cpu(), expected, msg=lambda text, key=key: f"{key}: {text}")
