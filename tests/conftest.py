@@ -26,7 +26,7 @@ def device(request: pytest.FixtureRequest) -> Iterator[torch.device]:
     """Another device than the CPU, real or pretended; see the option ``--device``."""
     name = request.config.getoption("--device")
     if name != "pretended":
-        yield torch.device(name)
+        yield torch.empty(0, device=name).device  # with its number
         return
     with PretendedDevice():
         yield PRETENDED

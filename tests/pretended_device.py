@@ -6,7 +6,7 @@ tensor of the CPU raises, as on a GPU; also where GPUs copy it silently (indices
 
 Inside ``with PretendedDevice(strict=True):`` only what runs on a GPU without the CPU waiting for it is allowed. An
 operation raises that makes a tensor on the CPU, be it to copy it over, or whose result depends on values: ``item``,
-``nonzero``, boolean masks as indices.
+``nonzero``, boolean masks as indices. Operators of torchfair itself may do inside what they like.
 
 Torch's own fake tensors carry no values, so they come to an end in such set-up, and where torch is built without CUDA
 they cannot be differentiated on a GPU that is not there.
@@ -110,6 +110,12 @@ def _run(operation: Any, args: Any, kwargs: Any, strict: bool) -> Any:
         raise RuntimeError(f"{operation}: a tensor on the CPU, {_shapes(tensors)}")
     if strict and _depends_on_values(operation, args):
         raise RuntimeError(f"{operation}: waits for values, {_shapes(tensors)}")
+    if operation.namespace not in ("aten", "prim"):  # with a kernel in Python, which may do what it likes
+        with PretendedDevice(), torch._C.DisableTorchFunction():
+            return operation._op_dk(torch._C.DispatchKey.CompositeExplicitAutograd, *args, **kwargs)
+    if torch._C._dispatch_has_kernel_for_dispatch_key(operation.name(), "CompositeImplicitAutograd"):
+        with PretendedDevice(strict=strict), torch._C.DisableTorchFunction():  # in such kernels they come as a whole
+            return operation.decompose(*args, **kwargs)
     if asked is not None and goes_there:
         kwargs = {**kwargs, "device": torch.device("cpu")}
     if operation is _aten._to_copy.default and len(there) == len(tensors) == 1 and not goes_there:

@@ -193,7 +193,8 @@ def _(vertices: Tensor, topology: Topology) -> Terms:
 
 @case("lifted_absolute_curvature_terms", triangles)
 def _(vertices: Tensor, topology: Topology) -> Case:
-    blocks = {"vertices": moved(vertices), **lifted_absolute_curvature_blocks(vertices, topology)}
+    blocks = lifted_absolute_curvature_blocks(vertices.cpu(), topology.to("cpu"))  # signs of eigenvectors are open
+    blocks = {"vertices": moved(vertices), **{name: block.to(vertices) for name, block in blocks.items()}}
     return blocks, lifted_absolute_curvature_terms(topology, smoothing=0.1)
 
 

@@ -11,10 +11,11 @@ from contextlib import AbstractContextManager, nullcontext
 import pytest
 import torch
 from pretended_device import PRETENDED, PretendedDevice
-from term_cases import CASES
+from term_cases import CASES, triangles
 from torch import Tensor
 
 from torchfair import constraints
+from torchfair.constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks
 from torchfair.projection import ElementTerm
 from torchfair.projection.layout import State
 from torchfair.projection.loss import apply_root
@@ -78,7 +79,18 @@ def _weighed(term: ElementTerm, found: dict[str, Tensor]) -> dict[str, Tensor]:
     return {
         "missed": term.missed(values),
         "contributions": term.contributions(arguments, values),
-        "roots": root,
-        "scaled residuals": apply_root(root, values),
-        "scaled jacobians": apply_root(root, found["jacobians"]),
+        "weights": root if root.ndim == 1 else root.mT @ root,  # the signs of eigenvectors are open
+        "gradients": (apply_root(root, values)[..., None] * apply_root(root, found["jacobians"])).sum(1),
     }
+
+
+def test_unknowns_beside_the_vertices_are_on_their_device(device: torch.device) -> None:
+    vertices, topology = triangles(CPU)
+    expected = lifted_absolute_curvature_blocks(vertices, topology)
+    found = lifted_absolute_curvature_blocks(vertices.to(device), topology.to(device))
+    for name, block in expected.items():
+        assert found[name].device == device
+        same = found[name].cpu()
+        if name == "directions":
+            same = same * (same * block).sum(1, keepdim=True).sign()
+        torch.testing.assert_close(same, block)
