@@ -236,6 +236,7 @@ def _(vertices: Tensor, topology: Topology) -> Case:
 @case("SaddleSides.terms", lattice)
 def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars) -> Terms:
     sides = c.SaddleSides(stars)
+    sides.reconsider(vertices)
     sides.decide(vertices)
     sides.reconsider(moved(vertices))
     sides.decide(moved(vertices))

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, nullcontext
 import pytest
 import torch
 from pretended_device import PRETENDED, PretendedDevice
-from term_cases import CASES, triangles
+from term_cases import CASES, lattice, triangles
 from torch import Tensor
 
 from torchfair import constraints
@@ -51,6 +51,8 @@ def test_terms_are_the_same_on_another_device_and_do_not_wait_for_it(name: str, 
         for term, there in zip(terms, terms_there, strict=True):
             assert term.num_elements > 0
             assert all(index.device == device for _, index in there.stencil)
+            for one, at in ((term, state), (there, state_there)):  # some remember the state before
+                one.arguments({key: 0.99 * block for key, block in at.items()})
             with _strictly(device, name not in UPLOADING_RESIDUALS):
                 found = _linearised(there, state_there)
             with _strictly(device, name not in UPLOADING_LOSSES):
@@ -82,6 +84,14 @@ def _weighed(term: ElementTerm, found: dict[str, Tensor]) -> dict[str, Tensor]:
         "weights": root if root.ndim == 1 else root.mT @ root,  # the signs of eigenvectors are open
         "gradients": (apply_root(root, values)[..., None] * apply_root(root, found["jacobians"])).sum(1),
     }
+
+
+def test_what_stars_are_to_be_is_kept_on_their_device(device: torch.device) -> None:
+    vertices, *_, stars = lattice(device)
+    sides = constraints.SaddleSides(stars)
+    assert sides.is_saddle.device == device
+    sides.decide(vertices)
+    assert sides.is_saddle.device == device
 
 
 def test_unknowns_beside_the_vertices_are_on_their_device(device: torch.device) -> None:
