@@ -6,7 +6,8 @@ tensor of the CPU raises, as on a GPU; also where GPUs copy it silently (indices
 
 Inside ``with PretendedDevice(strict=True):`` only what runs on a GPU without the CPU waiting for it is allowed. An
 operation raises that makes a tensor on the CPU, be it to copy it over, or whose result depends on values: ``item``,
-``nonzero``, boolean masks as indices. Operators of torchfair itself may do inside what they like.
+``nonzero``, boolean masks as indices. Operators of torchfair itself may do inside what they like. Where it is not
+strict, the device counts such operations instead.
 
 Torch's own fake tensors carry no values, so they come to an end in such set-up, and where torch is built without CUDA
 they cannot be differentiated on a GPU that is not there.
@@ -15,6 +16,7 @@ they cannot be differentiated on a GPU that is not there.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
 from typing import Any
 
 import torch
@@ -59,31 +61,38 @@ class PretendedTensor(Tensor):
 
     @classmethod
     def __torch_dispatch__(cls, operation: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
-        return _run(operation, args, kwargs or {}, strict=False)
+        return _run(operation, args, kwargs or {}, PretendedDevice())
 
 
 class PretendedDevice(TorchDispatchMode):
-    """See above. May be nested: the innermost says whether it is strict."""
+    """See above. May be nested: operations are those of the innermost.
+
+    Attributes:
+        strict: Whether operations are refused that make the CPU wait.
+        waits: Those that did, in order, operators of torchfair among them.
+    """
 
     def __init__(self, *, strict: bool = False) -> None:
         super().__init__()
         self.strict = strict
+        self.waits: list[str] = []
+        self._entered: list[ExitStack] = []
 
     def __enter__(self) -> PretendedDevice:
-        self._before = torch._C._only_lift_cpu_tensors()
+        stack = ExitStack()
+        stack.callback(torch._C._set_only_lift_cpu_tensors, torch._C._only_lift_cpu_tensors())
         torch._C._set_only_lift_cpu_tensors(True)  # torch.tensor(...) asks before it copies to another device
-        self._new_tensors = _NewTensors()
-        self._new_tensors.__enter__()
+        stack.enter_context(_NewTensors())
+        self._entered.append(stack)
         super().__enter__()
         return self
 
     def __exit__(self, *error: object) -> None:
         super().__exit__(*error)
-        self._new_tensors.__exit__(*error)
-        torch._C._set_only_lift_cpu_tensors(self._before)
+        self._entered.pop().close()
 
     def __torch_dispatch__(self, operation: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
-        return _run(operation, args, kwargs or {}, self.strict)
+        return _run(operation, args, kwargs or {}, self)
 
 
 class _NewTensors(TorchFunctionMode):
@@ -96,7 +105,7 @@ class _NewTensors(TorchFunctionMode):
         return function(*args, **(kwargs or {}))
 
 
-def _run(operation: Any, args: Any, kwargs: Any, strict: bool) -> Any:
+def _run(operation: Any, args: Any, kwargs: Any, device: PretendedDevice) -> Any:
     tensors = [*_tensors(args), *_tensors(kwargs.values())]
     there = [tensor for tensor in tensors if isinstance(tensor, PretendedTensor)]
     if operation is torch.ops.prim.device.default:
@@ -106,15 +115,19 @@ def _run(operation: Any, args: Any, kwargs: Any, strict: bool) -> Any:
     goes_there = target.type == PRETENDED.type
     if len({type(tensor) is PretendedTensor for tensor in tensors}) > 1 and operation not in _MOVES:
         raise RuntimeError(f"{operation}: tensors on two devices, {_shapes(tensors)}")
-    if strict and not (goes_there and len(there) == len(tensors)):
-        raise RuntimeError(f"{operation}: a tensor on the CPU, {_shapes(tensors)}")
-    if strict and _depends_on_values(operation, args):
-        raise RuntimeError(f"{operation}: waits for values, {_shapes(tensors)}")
+    stays = goes_there and len(there) == len(tensors)
+    if not stays or _depends_on_values(operation, args):
+        if device.strict:
+            reason = "waits for values" if stays else "a tensor on the CPU"
+            raise RuntimeError(f"{operation}: {reason}, {_shapes(tensors)}")
+        if there or goes_there:
+            device.waits.append(str(operation))
     if operation.namespace not in ("aten", "prim"):  # with a kernel in Python, which may do what it likes
+        device.waits.append(str(operation))
         with PretendedDevice(), torch._C.DisableTorchFunction():
             return operation._op_dk(torch._C.DispatchKey.CompositeExplicitAutograd, *args, **kwargs)
     if torch._C._dispatch_has_kernel_for_dispatch_key(operation.name(), "CompositeImplicitAutograd"):
-        with PretendedDevice(strict=strict), torch._C.DisableTorchFunction():  # in such kernels they come as a whole
+        with device, torch._C.DisableTorchFunction():  # in such kernels they come as a whole
             return operation.decompose(*args, **kwargs)
     if asked is not None and goes_there:
         kwargs = {**kwargs, "device": torch.device("cpu")}

@@ -14,12 +14,9 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair import constraints as c
 from torchfair.boundary import boundary_corners, boundary_pieces
+from torchfair.constraints import lifted_absolute_curvature as lifted_c
 from torchfair.constraints.closeness import TangentPlanes
 from torchfair.constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
-from torchfair.constraints.lifted_absolute_curvature import (
-    lifted_absolute_curvature_blocks,
-    lifted_absolute_curvature_terms,
-)
 from torchfair.constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
 from torchfair.constraints.lifted_principal_symmetric import lifted_blocks as lifted_spheres
 from torchfair.constraints.lifted_principal_symmetric import lifted_principal_symmetric_terms
@@ -94,9 +91,19 @@ def case(name: str, *shapes: Callable[[torch.device], Any]) -> Callable[[Callabl
     return register
 
 
-@case("absolute_curvature_terms", triangles)
-def _(vertices: Tensor, topology: Topology) -> Terms:
-    return c.absolute_curvature_terms(topology, smoothing=0.1)
+case("absolute_curvature_terms", triangles)(lambda v, t: c.absolute_curvature_terms(t, smoothing=0.1))
+case("corner_angle_terms", triangles, mixed)(
+    lambda v, t: c.corner_angle_terms(t, 0.01, 1.5 * corner_angles(v, t), weight=1.0)
+)
+case("eliminated_principal_symmetric_terms", lattice)(
+    lambda v, t, edges, stars: eliminated_principal_symmetric_terms(edges, stars, weight=2.0)
+)
+case("even_fairness_terms", triangles)(lambda v, t: c.even_fairness_terms(v, t, weight=0.5))
+case("even_star_terms", lattice)(lambda v, t, edges, stars: c.even_star_terms(stars, weight=0.5))
+case("face_area_terms", triangles, mixed)(lambda v, t: c.face_area_terms(t, 2.5 * face_areas(v, t), weight=0.5))
+case("interior_fairness_terms", triangles, mixed)(lambda v, t: c.interior_fairness_terms(t, weight=0.5))
+case("normal_variation_terms", triangles, mixed)(lambda v, t: c.normal_variation_terms(t, smoothing=0.1))
+case("pyramid_terms", triangles, mixed)(lambda v, t: c.pyramid_terms(t, weight=0.5))
 
 
 @case("along_directions", triangles)
@@ -129,11 +136,6 @@ def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars
     return {"vertices": vertices, **c.sphere_blocks(vertices, stars)}, c.coplanar_terms(edges, stars, weight=2.0)
 
 
-@case("corner_angle_terms", triangles, mixed)
-def _(vertices: Tensor, topology: Topology) -> Terms:
-    return c.corner_angle_terms(topology, 0.01, 1.5 * corner_angles(vertices, topology), weight=1.0)
-
-
 @case("cospherical_terms", lattice)
 def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars) -> Case:
     return {"vertices": moved(vertices), **c.sphere_blocks(vertices, stars)}, c.cospherical_terms(stars, weight=2.0)
@@ -151,26 +153,6 @@ def _(vertices: Tensor, topology: Topology) -> Case:
     return state, c.distance_limit_terms(planes, torch.full_like(vertices[:, 0], 0.1), weight=0.5)
 
 
-@case("eliminated_principal_symmetric_terms", lattice)
-def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars) -> Terms:
-    return eliminated_principal_symmetric_terms(edges, stars, weight=2.0)
-
-
-@case("even_fairness_terms", triangles)
-def _(vertices: Tensor, topology: Topology) -> Terms:
-    return c.even_fairness_terms(vertices, topology, weight=0.5)
-
-
-@case("even_star_terms", lattice)
-def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars) -> Terms:
-    return c.even_star_terms(stars, weight=0.5)
-
-
-@case("face_area_terms", triangles, mixed)
-def _(vertices: Tensor, topology: Topology) -> Terms:
-    return c.face_area_terms(topology, 2.5 * face_areas(vertices, topology), weight=0.5)
-
-
 @case("gliding_terms", triangles, mixed)
 def _(vertices: Tensor, topology: Topology) -> Case:
     pieces = boundary_pieces(topology, boundary_corners(vertices, topology, math.radians(40)))
@@ -186,16 +168,13 @@ def _(vertices: Tensor, topology: Topology) -> Terms:
     return c.handle_terms(chosen, moved(vertices)[chosen], weight=0.5)
 
 
-@case("interior_fairness_terms", triangles, mixed)
-def _(vertices: Tensor, topology: Topology) -> Terms:
-    return c.interior_fairness_terms(topology, weight=0.5)
-
-
 @case("lifted_absolute_curvature_terms", triangles)
 def _(vertices: Tensor, topology: Topology) -> Case:
-    blocks = lifted_absolute_curvature_blocks(vertices.cpu(), topology.to("cpu"))  # signs of eigenvectors are open
+    blocks = lifted_c.lifted_absolute_curvature_blocks(
+        vertices.cpu(), topology.to("cpu")
+    )  # signs of eigenvectors are open
     blocks = {"vertices": moved(vertices), **{name: block.to(vertices) for name, block in blocks.items()}}
-    return blocks, lifted_absolute_curvature_terms(topology, smoothing=0.1)
+    return blocks, lifted_c.lifted_absolute_curvature_terms(topology, smoothing=0.1)
 
 
 @case("lifted_normal_variation_terms", triangles, mixed)
@@ -212,19 +191,9 @@ def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars
     return {"vertices": moved(vertices), **lifted_spheres(vertices, edges, stars)}, terms
 
 
-@case("normal_variation_terms", triangles, mixed)
-def _(vertices: Tensor, topology: Topology) -> Terms:
-    return c.normal_variation_terms(topology, smoothing=0.1)
-
-
 @case("planarity_terms", mixed)
 def _(vertices: Tensor, topology: Topology) -> Terms:
     return c.planarity_terms(topology, torch.nonzero(topology.face_sizes > 3).squeeze(1), weight=0.5)
-
-
-@case("pyramid_terms", triangles, mixed)
-def _(vertices: Tensor, topology: Topology) -> Terms:
-    return c.pyramid_terms(topology, weight=0.5)
 
 
 @case("saddle_terms", triangles)

@@ -15,7 +15,9 @@ from term_cases import CASES, lattice, triangles
 from torch import Tensor
 
 from torchfair import constraints
+from torchfair.constraints.closeness import TangentPlanes
 from torchfair.constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks
+from torchfair.geometry import ReferenceSurface
 from torchfair.projection import ElementTerm
 from torchfair.projection.layout import State
 from torchfair.projection.loss import apply_root
@@ -61,6 +63,20 @@ def test_terms_are_the_same_on_another_device_and_do_not_wait_for_it(name: str, 
             for key, value in (expected | _weighed(term, expected)).items():
                 assert found[key].device == device, key
                 torch.testing.assert_close(found[key].cpu(), value, msg=lambda text, key=key: f"{key}: {text}")
+
+
+def test_closeness_waits_for_closest_points_once_for_each_state(device: torch.device) -> None:
+    if device != PRETENDED:
+        pytest.skip("real devices do not tell")
+    vertices, topology = triangles(device)
+    planes = TangentPlanes(ReferenceSurface(vertices, topology))
+    terms = constraints.closeness_terms(planes, topology.num_vertices, weight=1.0, device=device)
+    terms += constraints.distance_limit_terms(planes, torch.ones_like(vertices[:, 0]), weight=1.0)
+    for state in ({"vertices": vertices + shift} for shift in (0.1, 0.2)):
+        with PretendedDevice() as there:
+            for term in terms:
+                _weighed(term, _linearised(term, state))
+        assert there.waits == ["torchfair.closest.default"]
 
 
 def _strictly(device: torch.device, chosen: bool) -> AbstractContextManager[object]:

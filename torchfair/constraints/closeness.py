@@ -20,7 +20,7 @@ class TangentPlanes:
 
     The normal points from the closest point to the vertex where they differ, so that the distance to the
     plane, its gradient and the true distance agree; on the surface it is the interpolated vertex normal.
-    The last query is kept, since several terms ask for the same state.
+    The last answer is kept for the very tensor that was asked about, since several terms ask for the same state.
     """
 
     def __init__(self, reference: ReferenceSurface, block: str = "vertices") -> None:
