@@ -203,6 +203,33 @@ def test_closeness_on_the_surface_uses_the_vertex_normal() -> None:
     assert normals.allclose((vertices - 0.5) / math.sqrt(0.75))
 
 
+def test_terms_that_see_the_same_state_search_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    vertices, topology = wavy_grid()
+    planes = TangentPlanes(ReferenceSurface(vertices, topology))
+    searched = []
+    closest = planes._tracker.closest
+    monkeypatch.setattr(planes._tracker, "closest", lambda points: (searched.append(points), closest(points))[1])
+    limits = torch.ones(topology.num_vertices, dtype=DOUBLE)
+    terms = [
+        *constraints.closeness_terms(planes, topology.num_vertices, weight=1.0),
+        *constraints.distance_limit_terms(planes, limits, weight=1.0),
+    ]
+    state = {"vertices": vertices + 0.1}
+    near, limited = (term.arguments(state) for term in terms)
+    assert len(searched) == 1
+    assert near[1] is limited[1]
+    state["vertices"] += 0.1  # the same tensor with other values
+    again = terms[0].arguments(state)
+    assert len(searched) == 2
+    assert not torch.equal(again[1], near[1])
+    with torch.inference_mode():  # where torch does not count changes
+        inferred = {"vertices": vertices + 0.1}
+        first = terms[0].arguments(inferred)[1]
+        inferred["vertices"] += 0.1
+        assert torch.equal(first, near[1])
+        assert torch.equal(terms[0].arguments(inferred)[1], again[1])
+
+
 def test_distance_limit_is_a_wall() -> None:
     vertices, topology = cube()
     planes = TangentPlanes(ReferenceSurface(vertices, topology))
