@@ -8,7 +8,6 @@ import pytest
 import torch
 from helpers import DOUBLE, wavy_grid
 from torch import Tensor
-from torchfair.projection.normalisation import Normalisation
 
 from torchfair.curves import ClosedCurve
 from torchfair.energies import total_absolute_curvature
@@ -17,6 +16,7 @@ from torchfair.formfinding.boundary_track import BoundaryTrack
 from torchfair.formfinding.form_problem import FormProblem, staying_vertices
 from torchfair.formfinding.form_report import form_measures
 from torchfair.geometry import corner_angles, vertex_normals
+from torchfair.normalisation import Normalisation
 
 VERTICES, TOPOLOGY = wavy_grid(8, 7, triangles=True)
 FLAT = VERTICES * torch.tensor([1.0, 1.0, 0.0], dtype=DOUBLE)
