@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 import torch
-from bars import LENGTHS, VERTICES, all_derivatives, all_stretched, derivative, solved, term
+from bars import LENGTHS, VERTICES, all_derivatives, all_stretched, derivative, solved, stretched, term
 from helpers import DOUBLE, wavy_grid
 from torch import Tensor
 
@@ -36,6 +36,11 @@ def test_wrong_closed_forms_are_refused(mistake: str, dtype: torch.dtype) -> Non
 
     for one in (
         term(data=(LENGTHS.to(dtype),), jacobian=wrong),
+        term(
+            data=(LENGTHS.to(dtype),),
+            residual=lambda x, length: 1e3 * stretched(x, length),
+            jacobian=lambda x, length: 1e3 * wrong(x, length),
+        ),
         term(data=(LENGTHS.to(dtype),), residual=all_stretched, jacobian=batched, batched=True),
     ):
         with pytest.raises(TorchfairError, match=WORDS):
@@ -69,15 +74,16 @@ def test_the_place_of_a_wrong_closed_form_is_named() -> None:
             guided_projection(blocks, [one])
 
 
-def test_a_wrong_closed_form_of_a_linear_term_is_refused_at_zero_too() -> None:
-    """There every linear map meets the residual."""
+@pytest.mark.parametrize("start", [VERTICES, torch.zeros_like(VERTICES)])
+def test_a_wrong_closed_form_of_a_linear_term_is_refused_at_zero_too(start: Tensor) -> None:
+    """There every linear map meets the residual; elsewhere the closed form is to blame, not ``linear=True``."""
     wrong = term(
         residual=lambda x, length: x[0, 0] - length,
         jacobian=lambda x, length: -x.new_tensor([1.0, 0, 0, 0, 0, 0]),
         linear=True,
     )
     with pytest.raises(TorchfairError, match=WORDS):
-        guided_projection({"vertices": torch.zeros_like(VERTICES)}, [wrong])
+        guided_projection({"vertices": start}, [wrong])
 
 
 def test_another_subgradient_at_a_kink_is_no_mistake() -> None:

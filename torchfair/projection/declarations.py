@@ -85,7 +85,7 @@ def _mixture_differs(term: ElementTerm, arguments: tuple[Tensor, ...], closed: T
     Differentiating it costs one sweep instead of m. Every component has about the same share in it.
     """
     sizes = torch.nan_to_num(closed).abs().amax((0, 2))
-    sizes = torch.where(sizes > 0.0, sizes, sizes.max().clamp_min(torch.finfo(sizes.dtype).tiny))
+    sizes = torch.where(sizes > 0.0, sizes, sizes.max() if float(sizes.max()) else 1.0)
     shares = (2.0 + torch.sin(torch.arange(1, sizes.shape[0] + 1, device=sizes.device))).to(sizes) / sizes
     residual = checked(term, "residual")
 

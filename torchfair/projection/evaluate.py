@@ -58,6 +58,9 @@ def check_start(structure: Structure, start: Evaluation) -> None:
         if bad:
             raise TorchfairError(f"block '{name}' is not finite in rows {bad[:5]}: repair the start")
     if start.merit != float("inf"):
+        for term in structure.terms:
+            if term.linear:
+                check_declarations(term, term.arguments(state))
         affine = structure.affine
         misfit = affine.misfit(state, structure.layout.flatten(state)) if affine is not None else None
         if misfit is not None:
@@ -66,9 +69,6 @@ def check_start(structure: Structure, start: Evaluation) -> None:
             compiled.verify(arguments)
             if start.merit < 0.0:
                 check_merit(compiled.term, arguments, values)
-        for term in structure.terms:
-            if term.linear:
-                check_declarations(term, term.arguments(state))
         return
     for term in structure.terms:
         arguments = term.arguments(state)
