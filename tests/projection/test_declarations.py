@@ -74,15 +74,16 @@ def test_the_place_of_a_wrong_closed_form_is_named() -> None:
             guided_projection(blocks, [one])
 
 
-def test_a_wrong_closed_form_of_a_linear_term_is_refused_at_zero_too() -> None:
-    """There every linear map meets the residual."""
+@pytest.mark.parametrize("start", [VERTICES, torch.zeros_like(VERTICES)])
+def test_a_wrong_closed_form_of_a_linear_term_is_refused_at_zero_too(start: Tensor) -> None:
+    """There every linear map meets the residual; elsewhere the closed form is to blame, not ``linear=True``."""
     wrong = term(
         residual=lambda x, length: x[0, 0] - length,
         jacobian=lambda x, length: -x.new_tensor([1.0, 0, 0, 0, 0, 0]),
         linear=True,
     )
     with pytest.raises(TorchfairError, match=WORDS):
-        guided_projection({"vertices": torch.zeros_like(VERTICES)}, [wrong])
+        guided_projection({"vertices": start}, [wrong])
 
 
 def test_another_subgradient_at_a_kink_is_no_mistake() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from torch import Tensor
 from torchfair import ShapeError, TorchfairError
 from torchfair.projection import (
     ElementTerm,
-    GuidedProjection,
     OneSided,
     SmoothAbsolute,
     SmoothNuclearNorm,
@@ -216,40 +214,3 @@ class Norm:
 def test_losses_of_the_wrong_shape_are_named(part: str, shape: str) -> None:
     with pytest.raises(ShapeError, match=rf"term 'bars', {part} of its loss: expected {shape}, got \(3, 1\)"):
         solved(term(loss=Norm(part)))
-
-
-@pytest.mark.parametrize("linear", [False, True])
-def test_blocks_data_and_weights_that_require_gradients_are_detached(linear: bool) -> None:
-    """Nothing of the solve is recorded: the result requires no gradient, and none arrives at the inputs."""
-    values = {"x": VERTICES, "place": VERTICES + 1.0, "weight": torch.ones(4, dtype=DOUBLE)}
-    inputs = {name: value.clone().requires_grad_() for name, value in values.items()}
-    factor = torch.ones((), dtype=DOUBLE, requires_grad=True)  # not known to the term
-    recorded: list[bool] = []
-
-    def off(x: Tensor, place: Tensor) -> Tensor:
-        recorded.append(place.requires_grad)
-        return (x[:, 0] - place) * factor
-
-    def scaled_identity(x: Tensor, place: Tensor) -> Tensor:
-        return (factor * torch.eye(3, dtype=DOUBLE)).expand(x.shape[0], 3, 3)
-
-    row = torch.arange(4)[:, None]
-    one = ElementTerm(
-        "places",
-        off,
-        [("x", row)],
-        (inputs["place"],),
-        element_weights=inputs["weight"],
-        jacobian=scaled_identity,
-        linear=linear,
-        batched=True,
-    )
-    for terms in ([one], [replace(one, jacobian=None)]):
-        problem = GuidedProjection({"x": inputs["x"]}, terms)
-        for same in (problem, problem.with_terms(terms)):
-            result = same.solve({"x": inputs["x"]})
-            assert result.blocks["x"].allclose(values["place"])
-            assert not result.blocks["x"].requires_grad
-    assert recorded
-    assert not any(recorded)
-    assert all(tensor.grad is None for tensor in (*inputs.values(), factor))
