@@ -24,10 +24,6 @@ from torchfair.projection.loss import apply_root
 
 CPU = torch.device("cpu")
 
-UPLOADING_RESIDUALS = {"lifted_absolute_curvature_terms"}
-UPLOADING_LOSSES = {"absolute_curvature_terms", "along_directions"}
-"""Where symmetric matrices are made of their six components: constants are copied from the CPU at every call."""
-
 
 def makers_of_terms() -> Iterator[str]:
     """Public functions, and methods of public classes, that return terms, by what they are annotated with."""
@@ -55,9 +51,8 @@ def test_terms_are_the_same_on_another_device_and_do_not_wait_for_it(name: str, 
             assert all(index.device == device for _, index in there.stencil)
             for one, at in ((term, state), (there, state_there)):  # some remember the state before
                 one.arguments({key: 0.99 * block for key, block in at.items()})
-            with _strictly(device, name not in UPLOADING_RESIDUALS):
+            with _strictly(device):
                 found = _linearised(there, state_there)
-            with _strictly(device, name not in UPLOADING_LOSSES):
                 found |= _weighed(there, found)
             expected = _linearised(term, state)
             for key, value in (expected | _weighed(term, expected)).items():
@@ -79,8 +74,8 @@ def test_closeness_waits_for_closest_points_once_for_each_state(device: torch.de
         assert there.waits == ["torchfair.closest.default"]
 
 
-def _strictly(device: torch.device, chosen: bool) -> AbstractContextManager[object]:
-    return PretendedDevice(strict=True) if chosen and device == PRETENDED else nullcontext()
+def _strictly(device: torch.device) -> AbstractContextManager[object]:
+    return PretendedDevice(strict=True) if device == PRETENDED else nullcontext()
 
 
 def _linearised(term: ElementTerm, state: State) -> dict[str, Tensor]:

@@ -65,14 +65,10 @@ def check_start(structure: Structure, start: Evaluation) -> None:
         bad = rows(~torch.isfinite(block))
         if bad:
             raise TorchfairError(f"block '{name}' is not finite in rows {bad[:5]}: repair the start")
-<<<<<<< HEAD
     if bool(torch.isfinite(start.merits).all()):
-=======
-    if start.merit != float("inf"):
         for term in structure.terms:
             if term.linear:
                 check_declarations(term, term.arguments(state))
->>>>>>> wt-mistakes
         affine = structure.affine
         misfit = affine.misfit(state, structure.layout.flatten(state)) if affine is not None else None
         if misfit is not None:

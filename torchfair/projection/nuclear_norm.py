@@ -11,6 +11,8 @@ from torch import Tensor
 from .._numbers import check_number
 from ..errors import ShapeError
 
+_TWICE = math.sqrt(2.0)  # factor of components beside the diagonal, which stand for two entries
+
 
 @dataclass(frozen=True)
 class SmoothNuclearNorm:
@@ -45,35 +47,32 @@ class SmoothNuclearNorm:
         """Roots (n, 6, 6): components in the eigenvectors, weighted by the mean of two inverse eigenvalues."""
         values, vectors = torch.linalg.eigh(symmetric_matrix(residuals))
         inverse = torch.rsqrt(values.square() + self.epsilon**2)
-        i, j = _pairs(residuals.device)
+        i, j, _ = _pairs(residuals)
         weights = torch.sqrt(0.5 * (inverse[:, i] + inverse[:, j]))
         return weights[:, :, None] * _turned_basis(vectors)
 
 
 def symmetric_components(matrix: Tensor) -> Tensor:
     """Six components (..., 6) of the symmetric part of matrices (..., 3, 3): the same norm, an isometry."""
-    i, j = _pairs(matrix.device)
     both = 0.5 * (matrix + matrix.transpose(-1, -2))
-    return both[..., i, j] * _factors(matrix)
+    beside = [_TWICE * both[..., i, j] for i, j in ((1, 2), (0, 2), (0, 1))]
+    return torch.stack([both[..., 0, 0], both[..., 1, 1], both[..., 2, 2], *beside], dim=-1)
 
 
 def symmetric_matrix(components: Tensor) -> Tensor:
     """Matrices (..., 3, 3) with the given :func:`symmetric_components`; differentiable."""
-    scaled = components / _factors(components)
-    entries = torch.tensor([0, 5, 4, 5, 1, 3, 4, 3, 2], device=components.device)
-    return scaled.index_select(-1, entries).reshape(*components.shape[:-1], 3, 3)
+    a, b, c = components[..., :3].unbind(-1)
+    d, e, f = (components[..., 3:] / _TWICE).unbind(-1)
+    return torch.stack([a, f, e, f, b, d, e, d, c], dim=-1).reshape(*components.shape[:-1], 3, 3)
 
 
-def _pairs(device: torch.device) -> tuple[Tensor, Tensor]:
-    return (
-        torch.tensor([0, 1, 2, 1, 0, 0], device=device),
-        torch.tensor([0, 1, 2, 2, 2, 1], device=device),
-    )
-
-
-def _factors(like: Tensor) -> Tensor:
-    half = math.sqrt(2.0)
-    return like.new_tensor([1.0, 1.0, 1.0, half, half, half])
+def _pairs(like: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Rows and columns (6,) of the components, and their factors; made where they are used, without a copy."""
+    number = torch.arange(6, device=like.device)
+    diagonal = number < 3
+    rows = torch.where(diagonal, number, (number == 3).long())
+    columns = torch.where(diagonal, number, 2 - (number == 5).long())
+    return rows, columns, torch.where(diagonal, like.new_ones(()), _TWICE)
 
 
 def _turned_basis(vectors: Tensor) -> Tensor:
@@ -81,8 +80,7 @@ def _turned_basis(vectors: Tensor) -> Tensor:
 
     Component ``ij`` of the latter is ``sum_ab U_ai W_ab U_bj``, over a and b.
     """
-    i, j = _pairs(vectors.device)
-    factors = _factors(vectors)
+    i, j, factors = _pairs(vectors)
     rows = vectors.flatten(1).T.contiguous()  # elements last: operations on long rows are faster
 
     def entries(a: Tensor, i: Tensor) -> Tensor:
