@@ -134,9 +134,15 @@ class Course:
             return replace(self, accuracy=max(0.1 * self.accuracy, tightest_accuracy(settings)), falls=())
         return replace(self, suspicion=Status.MERIT_TOLERANCE)
 
-    def judged(self, *, certified: bool) -> Course:
-        """After a suspicion: the end where a minimum is certified; else it goes on, unless no damping is left."""
-        status = self.suspicion if certified else Status.STALLED if self.damping.exhausted else None
+    def judged(self, *, certified: bool, goes_on: bool) -> Course:
+        """After a suspicion.
+
+        Args:
+            certified: Whether this is a minimum.
+            goes_on: Whether the run goes on where it is none (unless no damping is left).
+        """
+        otherwise = Status.STALLED if self.damping.exhausted else None if goes_on else Status.SETTLED
+        status = self.suspicion if certified else otherwise
         return replace(self, suspicion=None, falls=self.falls if certified else (), status=status)
 
     def finished(self, settings: ProjectionSettings) -> Status | None:

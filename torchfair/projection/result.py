@@ -21,6 +21,9 @@ class Status(enum.Enum):
     GRADIENT_TOLERANCE = "the gradient is smaller than gradient_tolerance: converged"
     MERIT_TOLERANCE = "the merit no longer falls by more than merit_tolerance and none is promised: converged"
     ZERO_MERIT = "every residual is zero, as far as step_tolerance tells: converged"
+    SETTLED = (
+        "the merit no longer falls by more than merit_tolerance, but this was not found to be a minimum: not converged"
+    )
     MAX_ITERATIONS = "max_iterations reached: allow more iterations, or accept the result, which is the best found"
     TIME_LIMIT = "time_limit reached: allow more time, or accept the result, which is the best found"
     STALLED = (
@@ -40,6 +43,11 @@ class Status(enum.Enum):
             Status.MERIT_TOLERANCE,
             Status.ZERO_MERIT,
         }
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether a tolerance was met, be it at a minimum or not."""
+        return self.converged or self is Status.SETTLED
 
 
 @dataclass(frozen=True)

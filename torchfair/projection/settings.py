@@ -26,8 +26,10 @@ class ProjectionSettings:
             stiffness; or when the merit is below what a change of the unknowns by this fraction makes of it.
         merit_tolerance: Stop when the last ``patience`` accepted steps together lowered the merit by less than this
             fraction.
-        patience: See ``merit_tolerance``. A run ends as converged only if, besides one of these tests, an undamped step
-            promises no fall of the merit by more than ``merit_tolerance``; otherwise it goes on.
+        patience: See ``merit_tolerance``.
+        when_settled: What happens when one of these tests is met. ``"go on"`` ends the run only at a minimum, where an
+            undamped step promises no fall of the merit by more than ``merit_tolerance``; ``"judge"`` ends it and says
+            whether it is one; ``"stop"`` ends it without asking, as stages do that others follow.
         least_extrapolation: A step that gained more than predicted is tried again at the length at which a
             parabola through what was seen is smallest, if that is more than this many times longer;
             infinity never tries.
@@ -49,6 +51,7 @@ class ProjectionSettings:
     step_tolerance: float = 1e-10
     merit_tolerance: float = 1e-9
     patience: int = 3
+    when_settled: str = "go on"
     least_extrapolation: float = 1.25
     least_uncorrected_gain: float = 0.9
     time_limit: float | None = None

@@ -172,10 +172,14 @@ def _judged(problem: Problem, state: ProjectionState) -> ProjectionState:
     """Members that are suspected to be at a minimum either are there, or go on."""
     if not any(course.suspicion for course in state.courses):
         return state
-    problem.prepare()
-    answers = certified(problem, state)
+    chosen = state.settings.when_settled
+    if chosen == "stop":
+        answers = [False] * len(state.courses)
+    else:
+        problem.prepare()
+        answers = certified(problem, state)
     courses = [
-        course.judged(certified=answer) if course.suspicion else course
+        course.judged(certified=answer, goes_on=chosen == "go on") if course.suspicion else course
         for course, answer in zip(state.courses, answers, strict=True)
     ]
     return replace(state, courses=tuple(courses))
