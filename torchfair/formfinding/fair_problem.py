@@ -234,17 +234,17 @@ class FairProblem:
 
         E may rise where handles, another reference or planarity ask for a different shape.
         """
-        guard = self._guard
-        kept = guard.keeps_faces(state, trial) and guard.keeps_bounds(trial)
-        return kept and (self._other_goals or guard.keeps_energy(trial))
+        kept = self._guard.keeps_faces(state, trial) and self._guard.keeps_bounds(trial)
+        return kept and (self._other_goals or self._guard.keeps_energy(trial))
 
     @cached_property
     def _guard(self) -> FairGuard:
+        bounded = self.settings.quality_weight > 0.0
         return FairGuard(
             self.vertices,
             self.topology,
             self.placed,
-            smallest_angle=self._smallest_angle,
-            smallest_area=self.settings.smallest_area,
+            smallest_angle=bounded * self._smallest_angle,
+            smallest_area=bounded * self.settings.smallest_area,
             from_last=self.design_mode,
         )
