@@ -2,7 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+import pytest
+import torch
 from hypothesis import settings
+from pretended_device import PRETENDED, PretendedDevice
 
 settings.register_profile("torchfair", deadline=None)  # how long an example takes says more about the machine
 settings.load_profile("torchfair")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--device",
+        default="pretended",
+        help="of tests that ask for a device: cuda, or another one of torch; by default one that is pretended",
+    )
+
+
+@pytest.fixture
+def device(request: pytest.FixtureRequest) -> Iterator[torch.device]:
+    """Another device than the CPU, real or pretended; see the option ``--device``."""
+    name = request.config.getoption("--device")
+    if name != "pretended":
+        yield torch.empty(0, device=name).device  # with its number
+        return
+    with PretendedDevice():
+        yield PRETENDED

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from .errors import ShapeError
+from .errors import SettingsError, ShapeError
 from .topology import Topology
 
 
@@ -47,11 +47,11 @@ def boundary_corners(vertices: Tensor, topology: Topology, corner_angle: float) 
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
-        ValueError: if ``corner_angle`` is not between 0 and pi.
+        SettingsError: if ``corner_angle`` is not between 0 and pi.
     """
     topology.check_vertices(vertices)
     if not 0 <= corner_angle <= math.pi:
-        raise ValueError(
+        raise SettingsError(
             f"corner_angle: expected radians between 0 and pi, got {corner_angle}. Use math.radians for degrees."
         )
     loops = topology.loop_vertices

@@ -6,7 +6,7 @@ import math
 
 import pytest
 import torch
-from helpers import wavy_grid
+from helpers import random_rotation, wavy_grid
 from torch import Tensor
 
 from torchfair import Topology
@@ -97,7 +97,8 @@ def test_surfaces_are_turned_until_their_normals_are_those_prescribed() -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, -1.1])
 def test_bending_at_an_edge_is_its_length_times_the_sine(angle: float) -> None:
-    corners = torch.tensor([[0.0, 0, 0], [2, 0, 0], [0.7, math.cos(angle), math.sin(angle)]], dtype=torch.float64)
+    tip = [0.7, 1.7 * math.cos(angle), 1.7 * math.sin(angle)]
+    corners = torch.tensor([[0.0, 0, 0], [2, 0, 0], tip], dtype=torch.float64)
     topology = Topology.from_faces([[0, 1, 2]])
     normals = torch.stack([UP, UP, torch.zeros(3, dtype=torch.float64)])  # at the two ends of one edge
     (term,) = boundary_bending_terms(topology, normals, smoothing=1e-9, weight=3.0)
@@ -107,6 +108,48 @@ def test_bending_at_an_edge_is_its_length_times_the_sine(angle: float) -> None:
     assert float(values.abs()) == pytest.approx(2.0 * abs(math.sin(angle)), abs=1e-12)
     assert float(term.contributions(arguments, values)) == pytest.approx(6.0 * abs(math.sin(angle)), abs=1e-8)
     assert bool(torch.isfinite(jacobians).all())
+
+
+@pytest.mark.parametrize("along", [False, True])
+@pytest.mark.parametrize("apart", [0.0, 35.0, 60.0, 110.0, 150.0])
+def test_bending_counts_against_the_plane_halfway_between_the_normals_of_both_ends(apart: float, along: bool) -> None:
+    """However the prescribed normals twist along an edge or around it, the plane in its middle is level here."""
+    tilt = math.radians(apart) / 2.0
+    ends = [[math.sin(a), 0.0, math.cos(a)] if along else [0.0, math.sin(a), math.cos(a)] for a in (tilt, -tilt)]
+    tip = [0.7, 1.7 * math.cos(0.4), 1.7 * math.sin(0.4)]
+    corners = torch.tensor([[0.0, 0, 0], [2, 0, 0], tip], dtype=torch.float64)
+    normals = torch.tensor([*ends, [0.0, 0.0, 0.0]], dtype=torch.float64)
+    (term,) = boundary_bending_terms(Topology.from_faces([[0, 1, 2]]), normals, smoothing=1e-9)
+    assert float(term.values(term.arguments({"vertices": corners})).abs()) == pytest.approx(2.0 * math.sin(0.4))
+
+
+@pytest.mark.parametrize("apart", [152.0, 180.0])
+def test_normals_that_nearly_oppose_each_other_have_no_plane_between_them(apart: float) -> None:
+    tilt = math.radians(apart) / 2.0
+    rows = [[math.sin(tilt), 0.0, math.cos(tilt)], [-math.sin(tilt), 0.0, math.cos(tilt)], [0.0, 0.0, 0.0]]
+    normals = torch.tensor(rows, dtype=torch.float64)
+    assert boundary_bending_terms(Topology.from_faces([[0, 1, 2]]), normals, smoothing=1e-9) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_share_of_the_way_inwards_is_a_quotient_of_distances_from_the_boundary(seed: int) -> None:
+    """On a flat mesh with a straight side: of the centroid of a star and the mean of its neighbours inside."""
+    vertices, topology = wavy_grid(6, 5, triangles=True, seed=seed)
+    on_side = (torch.arange(6) * 5)[1:-1]  # x = 0 ... 5 along y = 0, corners left out
+    flat = vertices * torch.tensor([2.5, 1.5, 0.0], dtype=torch.float64)
+    flat[torch.arange(6) * 5, 1] = 0.0
+    turn = random_rotation(seed)
+    shares = BoundaryNormals.of(flat @ turn.T + 3.0, topology).share
+    triangles = flat[topology.triangles][..., :2]
+    (a, b, c) = triangles.unbind(1)
+    areas = 0.5 * torch.linalg.det(torch.stack([b - a, c - a], 1)).abs()
+    for vertex in on_side.tolist():
+        around = (topology.triangles == vertex).any(1)
+        centroid = float((areas * triangles.mean(1)[:, 1])[around].sum() / areas[around].sum())
+        ends = topology.edges[(topology.edges == vertex).any(1)].flatten().unique()
+        inner = [w for w in ends.tolist() if w != vertex and not topology.is_boundary_vertex[w]]
+        expected = min(max(centroid / float(flat[inner, 1].mean()), 0.0), 0.8)
+        assert float(shares[vertex]) == pytest.approx(expected)
 
 
 def test_a_surface_that_meets_its_planes_has_no_bending_there() -> None:

@@ -96,6 +96,27 @@ def test_even_bending_is_left_in_peace_by_even_fairness() -> None:
         assert float(values[inside].norm(dim=1).max()) < 0.15 * float(plain.min())
 
 
+def test_the_even_part_is_the_mean_normal_part_over_three_rings() -> None:
+    """Against a slow loop: thrice the mean over a vertex and its neighbours inside; the boundary has no say."""
+    umbrellas, normals = umbrella_vectors(VERTICES, TOPOLOGY), vertex_normals(VERTICES, TOPOLOGY)
+    inside = (~TOPOLOGY.is_boundary_vertex).tolist()
+    around = [[v] for v in range(TOPOLOGY.num_vertices)]
+    for v, w in TOPOLOGY.edges.tolist():
+        around[v].append(w)
+        around[w].append(v)
+    even = [torch.dot(u, n) * n for u, n in zip(umbrellas, normals, strict=True)]
+    for _ in range(3):
+        parts = [[even[w] for w in near if inside[w]] for near in around]
+        even = [sum(part) / len(part) if part else torch.zeros(3, dtype=torch.float64) for part in parts]
+    seen = 0
+    for term in even_fairness_terms(VERTICES, TOPOLOGY, weight=1.0):
+        values = term.values(term.arguments({"vertices": VERTICES}))
+        for centre, value in zip(term.stencil[0][1][:, 0].tolist(), values, strict=True):
+            torch.testing.assert_close(value, umbrellas[centre] - even[centre], atol=1e-12, rtol=0)
+            seen += 1
+    assert seen == sum(inside)
+
+
 def test_even_fairness_removes_noise() -> None:
     noise = 0.2 * torch.randn(VERTICES.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
     rough = VERTICES + noise * (~TOPOLOGY.is_boundary_vertex)[:, None]

@@ -20,6 +20,7 @@ from torchfair.constraints.side_curvatures import (
 )
 from torchfair.geometry import corner_angles
 from torchfair.principal import principal_edges_of_lattice
+from torchfair.principal.principal_edges import PrincipalStars
 from torchfair.principal.spheres import spheres_through
 from torchfair.projection.term import differentiate
 from torchfair.shapes import Catenoid, Torus, principal_triangles
@@ -125,6 +126,56 @@ def test_a_star_of_small_excess_is_to_lose_it_and_one_of_large_excess_is_to_be_a
     values = term.values(term.arguments({"vertices": mesh.vertices}))
     assert bool((values[~sides.is_saddle][:, :7] == 0.0).all())
     assert bool((values[sides.is_saddle][:, 7] == 0.0).all())
+
+
+def single_stars(x: Tensor) -> tuple[Tensor, PrincipalStars]:
+    """Vertices (7n, 3) of n stars ``x`` (n, 7, 3) that have nothing to do with each other."""
+    first = 7 * torch.arange(x.shape[0])
+    near = first[:, None] + torch.arange(7)
+    return x.reshape(-1, 3), PrincipalStars(first, near[:, [1, 4]], near[:, [2, 3, 5, 6]])
+
+
+def change_of_curvatures(sides: list[float], sphere: float, sign: float) -> float:
+    """What it takes to bring the sphere to the side ``sign`` and the principal neighbours beyond all three planes."""
+    return max(0.0, *(sign * side for side in sides)) + max(0.0, -sign * sphere)
+
+
+def test_a_star_takes_the_side_of_the_smaller_change_and_is_a_saddle_if_that_is_nearer_than_losing_its_excess() -> None:
+    """Of all curvatures the one of the sphere keeps its sign unless neighbours on its side ask for the other."""
+    x = symmetric_star(0.0, 0.0).repeat(400, 1, 1)
+    x[:, 1:] += 0.25 * torch.randn(400, 6, 3, dtype=DOUBLE, generator=torch.Generator().manual_seed(3))
+    vertices, stars = single_stars(x)
+    decided = SaddleSides(stars)
+    decided.decide(vertices)
+    is_saddle, per_curvature, _ = decided(state={})
+    sides, spheres = (part.tolist() for part in side_curvatures(x))
+    turned, saddles = 0, []
+    for star, excess in enumerate(angle_excess(x).tolist()):
+        beside = sides[star]
+        keeps = 1.0 if spheres[star] >= 0 else -1.0
+        asked = -1.0 if sum(beside) >= 0 else 1.0
+        keep, turn = (change_of_curvatures(beside, spheres[star], sign) for sign in (keeps, asked))
+        expected = asked if turn < keep else keeps
+        assert math.copysign(1.0, float(per_curvature[star])) == expected
+        turned += expected != keeps
+        spokes = x[star, 1:] - x[star, 0]
+        areas = [float(torch.linalg.cross(spokes[i], spokes[(i + 1) % 6]).norm()) for i in range(6)]
+        size = max(abs(spheres[star]), sum(abs(side) for side in beside) / 6, 1e-2)
+        saddles.append(excess > 0 and min(keep, turn) <= excess / (sum(areas) / 6 * size))
+        assert abs(float(per_curvature[star])) == pytest.approx(1.0 / size)
+    assert decided.is_saddle.tolist() == saddles == (is_saddle > 0).tolist()
+    assert 20 < turned < 380
+    assert 20 < sum(saddles) < 380
+    assert int((angle_excess(x) > 0).sum()) > sum(saddles) + 20
+
+
+@pytest.mark.parametrize(("sphere", "sign"), [(0.02, -1.0), (-0.02, -1.0), (0.9, 1.0), (-0.9, -1.0)])
+def test_a_nearly_flat_sphere_is_turned_and_a_curved_one_kept(sphere: float, sign: float) -> None:
+    """With principal neighbours at curvature 0.3 the sphere is to lie below them, unless it is far above."""
+    vertices, stars = single_stars(symmetric_star(0.3, sphere))
+    sides = SaddleSides(stars)
+    sides.decide(vertices)
+    assert math.copysign(1.0, float(sides(state={})[1])) == sign
 
 
 def by_autograd(function: Callable[[Tensor], Tensor], x: Tensor) -> Tensor:

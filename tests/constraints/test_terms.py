@@ -144,6 +144,35 @@ def test_fairness_vanishes_on_regular_lattices_and_acts_on_every_interior_vertex
         assert torch.isin(torch.nonzero(~topology.is_boundary_vertex).squeeze(1), felt).all()
 
 
+def fan(sizes: list[int]) -> tuple[Tensor, Topology]:
+    """Vertex 0 with faces of these sizes around it, its neighbours 1, 2, ... first; generic position."""
+    count, faces = 1 + len(sizes), []
+    for number, size in enumerate(sizes):
+        outer = list(range(count, count + size - 3))
+        count += len(outer)
+        faces.append([0, 1 + number, *outer, 1 + (number + 1) % len(sizes)])
+    points = torch.randn(count, 3, dtype=DOUBLE, generator=torch.Generator().manual_seed(7))
+    return points, Topology.from_faces(faces)
+
+
+@pytest.mark.parametrize(
+    "sizes", [[4, 4, 4, 4], [4, 4, 4, 3], [4, 4, 3, 4, 4], [4, 4, 3, 4, 4, 3], [4, 4, 4], [3, 3, 3, 3], [4, 4, 4, 5]]
+)
+def test_second_differences_stand_for_umbrellas_between_exactly_four_quads_only(sizes: list[int]) -> None:
+    """A vertex with four quads and triangles besides lies on no grid: without its umbrella nothing would hold it."""
+    points, topology = fan(sizes)
+    found = [
+        value for term in constraints.interior_fairness_terms(topology, weight=1.0) for value in values(term, points)
+    ]
+    ring = points[1 : 1 + len(sizes)]
+    if sizes == [4, 4, 4, 4]:
+        expected = [0.5 * (ring[0] + ring[2]) - points[0], 0.5 * (ring[1] + ring[3]) - points[0]]
+    else:
+        expected = [ring.mean(0) - points[0]]
+    assert len(found) == len(expected)
+    assert all(any(value.allclose(other) for value in found) for other in expected)
+
+
 def test_boundary_fairness_leaves_corners_alone() -> None:
     vertices, topology = wavy_grid()
     flat = vertices.round() * torch.tensor([1.0, 1.0, 0.0], dtype=DOUBLE)
@@ -174,6 +203,33 @@ def test_closeness_on_the_surface_uses_the_vertex_normal() -> None:
     assert normals.allclose((vertices - 0.5) / math.sqrt(0.75))
 
 
+def test_terms_that_see_the_same_state_search_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    vertices, topology = wavy_grid()
+    planes = TangentPlanes(ReferenceSurface(vertices, topology))
+    searched = []
+    closest = planes._tracker.closest
+    monkeypatch.setattr(planes._tracker, "closest", lambda points: (searched.append(points), closest(points))[1])
+    limits = torch.ones(topology.num_vertices, dtype=DOUBLE)
+    terms = [
+        *constraints.closeness_terms(planes, topology.num_vertices, weight=1.0),
+        *constraints.distance_limit_terms(planes, limits, weight=1.0),
+    ]
+    state = {"vertices": vertices + 0.1}
+    near, limited = (term.arguments(state) for term in terms)
+    assert len(searched) == 1
+    assert near[1] is limited[1]
+    state["vertices"] += 0.1  # the same tensor with other values
+    again = terms[0].arguments(state)
+    assert len(searched) == 2
+    assert not torch.equal(again[1], near[1])
+    with torch.inference_mode():  # where torch does not count changes
+        inferred = {"vertices": vertices + 0.1}
+        first = terms[0].arguments(inferred)[1]
+        inferred["vertices"] += 0.1
+        assert torch.equal(first, near[1])
+        assert torch.equal(terms[0].arguments(inferred)[1], again[1])
+
+
 def test_distance_limit_is_a_wall() -> None:
     vertices, topology = cube()
     planes = TangentPlanes(ReferenceSurface(vertices, topology))
@@ -187,13 +243,13 @@ def test_distance_limit_is_a_wall() -> None:
 def test_gliding_is_free_along_the_curve_and_stops_at_its_ends() -> None:
     line = torch.tensor([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]], dtype=DOUBLE)
     curves = SplineCurves([line], [False])
-    feet = constraints.CurveFeet(curves, torch.tensor([0, 1]), torch.zeros(2, dtype=torch.int64))
+    feet = constraints.CurveFeet(curves, torch.arange(3), torch.zeros(3, dtype=torch.int64))
     (term,) = constraints.gliding_terms(feet, weight=1.0)
-    points = torch.tensor([[0.7, 0.3, 0.4], [2.6, 0.8, 0.0]], dtype=DOUBLE)
+    points = torch.tensor([[0.7, 0.3, 0.4], [2.6, 0.8, 0.0], [-0.8, 0.0, 0.6]], dtype=DOUBLE)
     residuals, jacobians = term.derivatives(term.arguments({"vertices": points}))
-    assert torch.linalg.vector_norm(residuals, dim=1).allclose(torch.tensor([0.5, 1.0], dtype=DOUBLE))
+    assert torch.linalg.vector_norm(residuals, dim=1).allclose(torch.tensor([0.5, 1.0, 1.0], dtype=DOUBLE))
     assert (jacobians[0, :, 0].abs() < 1e-14).all()
-    assert jacobians[1].allclose(torch.eye(3, dtype=DOUBLE))
+    assert jacobians[1:].allclose(torch.eye(3, dtype=DOUBLE))
 
 
 def test_boundary_pieces_and_gliding_need_no_boundary() -> None:

@@ -201,16 +201,15 @@ def test_dtype_conversions_and_meta_leave_the_topology_alone(energy):
         assert module(vertices).item() == value.item()
 
 
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
 @every_energy
-def test_follows_to_a_device(energy):
+def test_follows_to_a_device(energy, device):
     vertices, topology = mixed_grid()
     module = energy.module(topology)
-    parent = nn.Sequential(module).to("cuda")
-    assert module.topology.device.type == "cuda"
+    parent = nn.Sequential(module).to(device)
+    assert module.topology.device == device
     assert topology.device.type == "cpu"
     assert all(name in vars(module.topology) for name in module.needs)
-    torch.testing.assert_close(parent(vertices.cuda()).cpu(), energy(vertices, topology))
+    torch.testing.assert_close(parent(vertices.to(device)).cpu(), energy(vertices, topology))
 
 
 @every_energy

@@ -409,9 +409,8 @@ def test_compiles_to_one_graph_with_its_backward(weighted):
     torch.testing.assert_close(gradient, gradient_of(normal_variation, vertices, topology, weights))
 
 
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
 @every_mesh
-def test_on_a_cuda_device(mesh):
+def test_on_another_device(mesh, device):
     vertices, topology = mesh()
-    there = gradient_of(normal_variation, vertices.cuda(), topology.to("cuda"))
+    there = gradient_of(normal_variation, vertices.to(device), topology.to(device))
     torch.testing.assert_close(there.cpu(), gradient_of(normal_variation, vertices, topology))

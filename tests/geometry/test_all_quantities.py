@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import hypothesis.strategies as st
@@ -11,6 +12,7 @@ import torch
 from geometry_meshes import DEGENERATE, GENERIC, mixed_grid, with_isolated
 from helpers import random_rotation
 from hypothesis import given, settings
+from pretended_device import PRETENDED, PretendedDevice
 from torch import Tensor
 
 import torchfair.geometry as geometry
@@ -89,6 +91,25 @@ def test_batches_equal_loops_and_vmap_in_both_dtypes(quantity, mesh):
         mapped = torch.func.vmap(lambda v: quantity(v, topology))(some.flatten(0, 1)).unflatten(0, (2, 3))
         torch.testing.assert_close(together, alone)
         torch.testing.assert_close(together, mapped)
+
+
+@every_quantity
+@every_mesh
+def test_is_the_same_on_another_device_and_does_not_wait_for_it(quantity, mesh, device):
+    vertices, topology = mesh()
+
+    def gradient(points: Tensor, connectivity: Topology) -> tuple[Tensor, Tensor]:
+        variable = points.clone().requires_grad_()
+        value = quantity(variable, connectivity)
+        value.square().sum().backward()
+        return value.detach(), variable.grad
+
+    there, moved = vertices.to(device), topology.to(device)
+    with PretendedDevice(strict=True) if device == PRETENDED else nullcontext():
+        found = gradient(there, moved)
+    for mine, other in zip(gradient(vertices, topology), found, strict=True):
+        assert other.device == device
+        torch.testing.assert_close(other.cpu(), mine)
 
 
 @every_quantity

@@ -51,6 +51,19 @@ def test_reflex_corners_of_polygons_exceed_pi(turn):
     assert torch.autograd.gradcheck(lambda v: corner_angles(v, topology), vertices.clone().requires_grad_())
 
 
+@pytest.mark.parametrize("turn", [False, True])
+def test_reflex_corners_of_quads_exceed_pi(turn):
+    """An arrowhead: half a square whose diagonal is pushed in to a fourth of the way."""
+    vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [0.5, 0.5, 0], [0, 2, 0]], dtype=DOUBLE)
+    if turn:
+        vertices = vertices @ random_rotation(1).T
+    thin = math.atan(1 / 3)
+    expected = torch.tensor([math.pi / 2, thin, 1.5 * math.pi - 2 * thin, thin], dtype=DOUBLE)
+    for start in range(4):
+        topology = Topology.from_faces([[(start + k) % 4 for k in range(4)]])
+        torch.testing.assert_close(corner_angles(vertices, topology), expected.roll(-start))
+
+
 def test_straight_and_folded_corners_and_corners_without_angle():
     topology = Topology.from_faces([[0, 1, 2]])
     line = torch.tensor([[0.0, 0, 0], [1, 0, 0], [3, 0, 0]], dtype=DOUBLE)

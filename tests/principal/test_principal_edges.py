@@ -106,6 +106,15 @@ def test_a_polyline_passes_a_boundary_vertex_that_it_only_touches() -> None:
     assert [4, 5, 8] in lines or [8, 5, 4] in lines
 
 
+@every_lattice
+def test_where_all_edges_are_principal_every_edge_is_a_polyline(name: str) -> None:
+    """No vertex, inside or on the boundary, has just two opposite ones."""
+    mesh, _ = LATTICES[name]
+    everything = torch.ones(mesh.topology.num_edges, dtype=torch.bool)
+    lines = PrincipalEdges(mesh.topology, everything).polylines()
+    assert sorted(sorted(line.tolist()) for line in lines) == sorted(mesh.topology.edges.sort(1).values.tolist())
+
+
 # ---- finer meshes ----------------------------------------------------------------------------------------
 
 

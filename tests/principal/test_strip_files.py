@@ -144,3 +144,12 @@ def test_what_cannot_be_written(tmp_path: Path, strips: DevelopableStrips, suffi
         write(path, strips)
     write(path, strips, overwrite=True)
     assert path.read_text() != "old"
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_extensions_may_be_in_capitals(tmp_path: Path, strips: DevelopableStrips, suffix: str) -> None:
+    if suffix == ".dxf":
+        pytest.importorskip("ezdxf")
+    path = tmp_path / f"STRIPS{suffix.upper()}"
+    WRITERS[suffix](path, strips)
+    assert path.stat().st_size > 0

@@ -155,6 +155,19 @@ def test_shelves_hold_all_boxes(boxes: list[tuple[float, float]], gap: float, wi
     assert width is None or layout.width == width
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_sheet_without_a_given_width_is_the_smallest_of_those_from_square_to_twice_as_broad(seed: int) -> None:
+    sizes = np.random.default_rng(seed).uniform(0.2, 3.0, (30, 2))
+    gap = 0.1
+    chosen = shelves(sizes, gap, None)
+    square = math.sqrt(float((sizes + gap).prod(1).sum()))
+    narrowest = float(sizes[:, 0].max()) + 2 * gap
+    areas = [step * square / 8 * shelves(sizes, gap, max(narrowest, step * square / 8)).height for step in range(8, 17)]
+    assert chosen.width * chosen.height <= min(areas) * (1 + 1e-9)
+    assert chosen.width * chosen.height < max(areas)
+    assert chosen.width <= 2 * square
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_bounding_boxes_are_smallest(seed: int) -> None:
     flat = walk(seed)
@@ -184,6 +197,26 @@ def test_strips_too_long_for_the_sheet_are_halved() -> None:
     assert whole.names == ("1",)
     with pytest.raises(TorchfairError, match=r"sheet_width: a strip needs 1\.5 with gaps, the sheet has 1\.4"):
         developable_strips(points, [line], normals, 0.5, sheet_width=1.4, gap=0.25)
+
+
+def straight(length: int) -> tuple[Tensor, list[Tensor], Tensor]:
+    """A line of edges of length 1 with upright normals: its strip is a rectangle."""
+    points = torch.stack([torch.arange(length + 1, dtype=DOUBLE), *torch.zeros(2, length + 1, dtype=DOUBLE)], dim=1)
+    return points, [torch.arange(length + 1)], torch.tensor([0.0, 0, 1], dtype=DOUBLE).expand(length + 1, 3)
+
+
+@pytest.mark.parametrize("room", [-0.01, 0.01, 0.3, 0.49, 0.51])
+def test_a_strip_stays_whole_exactly_if_there_is_a_gap_at_both_of_its_ends(room: float) -> None:
+    strips = developable_strips(*straight(32), 0.5, sheet_width=32.0 + room, gap=0.25)
+    assert strips.offsets.diff().tolist() == ([33] if room >= 0.5 else [17, 17])
+    if room < 0.5:  # two rows
+        assert strips.sheet == pytest.approx((32.0 + room, 2 * 0.5 + 3 * 0.25))
+
+
+def test_the_gap_is_a_quarter_of_the_width_of_the_strips_unless_given() -> None:
+    for gap, expected in ((None, (0.3 + 0.1) / 4), (0.0, 0.0), (0.7, 0.7)):
+        strips = developable_strips(*straight(5), 0.3, depth=0.1, gap=gap)
+        assert strips.sheet == pytest.approx((5.0 + 2.0 * expected, 0.4 + 2.0 * expected))
 
 
 def test_more_pieces_than_letters() -> None:

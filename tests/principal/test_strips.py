@@ -251,6 +251,24 @@ def test_strips_leave_out_what_has_no_normal() -> None:
     assert open_line.polylines.tolist() == [0]
 
 
+@pytest.mark.parametrize("is_closed", [True, False])
+@pytest.mark.parametrize("missing", [0, 1, 2, 3])
+def test_strips_cover_each_edge_between_two_normals_once(missing: int, is_closed: bool) -> None:
+    """However many normals are missing, and wherever along the polyline; no strip goes on across a gap."""
+    count = 7
+    points, normals, line = circle(count, 2.0, 0.0, 0.4)
+    line = line if is_closed else line[:-1]
+    for gaps in itertools.combinations(range(count), missing):
+        some = normals.clone()
+        some[list(gaps)] = 0
+        expected = [(v, w) for v, w in itertools.pairwise(line.tolist()) if v not in gaps and w not in gaps]
+        strips = developable_strips(points, [line], some, 0.1)
+        parts = [strips.mesh_vertices[a:b].tolist() for a, b in itertools.pairwise(strips.offsets.tolist())]
+        assert sorted(step for part in parts for step in itertools.pairwise(part)) == sorted(expected)
+        starts = {v for v, _ in expected} - {w for _, w in expected}
+        assert len(parts) == (1 if is_closed and not gaps else len(starts))
+
+
 def test_no_polylines_no_strips() -> None:
     points, normals, line = circle(6, 1.0, 0.0, 0.0)
     for lines, n in (([], normals), ([line], 0 * normals)):

@@ -15,6 +15,7 @@ from star_tools import Star, directions, has_witness, random_arms, star_of, star
 from torchfair import ShapeError, Topology
 from torchfair.geometry import angle_defects
 from torchfair.stars import StarKind, classify_stars
+from torchfair.stars._patterns import four_run_patterns, uneven
 
 CONVEX, SADDLE, NEITHER, EXCLUDED = map(int, StarKind)
 
@@ -184,3 +185,38 @@ def test_nan_is_no_class_and_a_batch_is_refused() -> None:
     assert (int(classes.kinds[0]), bool(classes.degenerate[0])) == (NEITHER, True)
     with pytest.raises(ShapeError, match="not a batch"):
         classify_stars(vertices[None], topology)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_a_floor_around_the_foot_of_a_box_is_no_inflection_face(reverse: bool) -> None:
+    """Its corner is reflex and both its edges are concave; the walls have one concave and one convex edge each."""
+    points = [[0.0, 0, 0], [1, 0, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]]
+    faces = [[0, 5, 4, 3, 2, 1], [0, 1, 7, 6], [0, 6, 8, 5]]
+    topology = Topology.from_faces([face[::-1] for face in faces] if reverse else faces)
+    classes = classify_stars(torch.tensor(points, dtype=DOUBLE), topology)
+    inflections = classes.topology.corner_faces[classes.inflections & (topology.corners == 0)]
+    assert inflections.tolist() == [1, 2]
+    assert int(classes.inflection_counts[0]) == 2
+
+
+def test_thousands_of_equal_stars_are_all_judged_alike() -> None:
+    """Stars are judged some thousand at a time."""
+    star = [[1.0, 0.1, 0.4], [0.0, 1.2, -0.3], [-0.9, 0.0, 0.5], [0.1, -1.0, -0.4]]
+    arms = np.repeat(np.array([star]), 9000, axis=0)
+    classes = classify_stars(*stars_of(arms))
+    assert bool((classes.kinds[::5] == SADDLE).all())
+    assert bool((classes.sides.view(9000, -1) == classes.sides.view(9000, -1)[:1]).all())
+    assert bool((classes.inflection_counts[::5] == 4).all())
+
+
+@pytest.mark.parametrize("valence", [4, 6, 9, 20])
+def test_planes_that_cut_opposite_sectors_alike_come_first_then_those_with_the_shortest_longest_run(
+    valence: int,
+) -> None:
+    crossed = four_run_patterns(valence).crossed
+    runs = (crossed.roll(-1, 1) - crossed) % valence
+    keys = [(abs(a - c) + abs(b - d), max(a, b, c, d)) for a, b, c, d in runs.tolist()]
+    ranks = dict(zip(keys, uneven(crossed, valence).tolist(), strict=True))
+    assert [ranks[key] for key in keys] == uneven(crossed, valence).tolist()
+    assert sorted(ranks, key=ranks.__getitem__) == sorted(ranks)
+    assert len(set(ranks.values())) == len(ranks)

@@ -39,7 +39,10 @@ def test_equals_all_pairs(triangles: bool, seed: int) -> None:
     vertices, topology = wavy_grid(9, 8, triangles=triangles, seed=seed)
     for height in (0.1, 1.0):
         flatter = vertices * torch.tensor([1, 1, height], dtype=DOUBLE)
-        assert gauss_overlaps(flatter, topology).crossings == all_pairs(flatter, topology) > 0
+        overlaps = gauss_overlaps(flatter, topology)
+        assert overlaps.crossings == all_pairs(flatter, topology) > 0
+        # Arcs of stars at the boundary belong to no pyramid.
+        assert overlaps.within_pyramids == int(pyramid_self_intersections(flatter, topology).sum())
 
 
 def test_within_pyramids_are_their_self_intersections() -> None:
@@ -47,6 +50,16 @@ def test_within_pyramids_are_their_self_intersections() -> None:
     overlaps = gauss_overlaps(vertices, topology)
     assert overlaps.within_pyramids == int(pyramid_self_intersections(vertices, topology).sum()) > 0
     assert overlaps.between_stars == overlaps.crossings - overlaps.within_pyramids > 0
+
+
+@pytest.mark.parametrize("valence", [4, 5, 7])
+def test_long_arcs_are_found_wherever_they_cross(valence: int) -> None:
+    """Of crumpled stars arcs reach over half of the sphere; far from their middles they cross too."""
+    for height in (1.0, 3.0):
+        vertices, topology = stars_of(random_arms(40, valence, 3, height=height))
+        overlaps = gauss_overlaps(vertices, topology)
+        assert overlaps.crossings == all_pairs(vertices, topology)
+        assert overlaps.within_pyramids == int(pyramid_self_intersections(vertices, topology).sum()) > 0
 
 
 def test_convex_surfaces_have_none_and_a_torus_some_between_stars() -> None:

@@ -151,6 +151,8 @@ def test_terms_of_guided_projection_have_the_merit_of_the_penalties() -> None:
     ):
         merit = sum(term.contributions(a := term.arguments(state), term.values(a)).sum() for term in terms)
         torch.testing.assert_close(merit, penalty)  # half the sum of squares, times the weight
+    (pyramids,) = pyramid_terms(topology, weight=2.0)
+    assert pyramids.values(pyramids.arguments(state)).shape[1] == 6 * 3 / 2  # pairs of arcs that are no neighbours
 
 
 def test_guided_projection_makes_good_saddles_of_bad_stars() -> None:

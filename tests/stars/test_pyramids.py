@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 from geometry_meshes import DEGENERATE, GENERIC, icosphere, random_polytope, torus
-from helpers import DOUBLE, cube, random_rotation, tetrahedron
+from helpers import DOUBLE, cube, random_rotation, tetrahedron, wavy_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from star_tools import random_arms, star_of, stars_of
@@ -143,6 +143,16 @@ def test_rounding_makes_no_crossings() -> None:
     for z in (0.3 * x - 0.2 * y + 10, (1 - (x - 1) ** 2).sqrt()):
         vertices = torch.stack([x, y, z], dim=-1).reshape(-1, 3).to(torch.float32)
         assert int(pyramid_self_intersections(vertices, topology).sum()) == 0
+
+
+@pytest.mark.parametrize("distance", [30.0, 1000.0])
+def test_rounding_of_places_far_from_the_origin_makes_no_crossings(distance: float) -> None:
+    """In single precision a place loses digits with its distance, and small faces turn the more."""
+    vertices, topology = wavy_grid(30, 30, triangles=True)
+    flat = 0.1 * vertices * torch.tensor([1.0, 1.0, 0.0], dtype=DOUBLE) @ random_rotation(1).T
+    far = (flat + distance * torch.tensor([1.0, 0.7, -0.4], dtype=DOUBLE)).float()
+    assert int(pyramid_self_intersections(far.double(), topology).sum()) > 0  # if these were the exact places
+    assert int(pyramid_self_intersections(far, topology).sum()) == 0
 
 
 # ---- order, perimeter, winding -------------------------------------------------------------------------

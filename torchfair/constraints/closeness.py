@@ -20,19 +20,19 @@ class TangentPlanes:
 
     The normal points from the closest point to the vertex where they differ, so that the distance to the
     plane, its gradient and the true distance agree; on the surface it is the interpolated vertex normal.
-    The last query is kept, since several terms ask for the same state.
+    The last answer is kept for the very tensor that was asked about, since several terms ask for the same state.
     """
 
     def __init__(self, reference: ReferenceSurface, block: str = "vertices") -> None:
         self.reference, self.block = reference, block
         self._tracker = reference.tracker()
-        self._points: Tensor | None = None
+        self._asked: tuple[Tensor, int] | None = None
         self._answer: tuple[Tensor, Tensor] | None = None
 
     def __call__(self, state: State) -> tuple[Tensor, Tensor]:
         """Closest points ``(V, 3)`` and unit normals ``(V, 3)`` for all vertices of the state."""
         points = state[self.block]
-        if self._points is not None and self._answer is not None and torch.equal(self._points, points):
+        if self._answer is not None and self._is_last(points):
             return self._answer
         closest = self._tracker.closest(points)
         away = points - closest.positions
@@ -41,8 +41,13 @@ class TangentPlanes:
         side = torch.where((away * smooth).sum(1, keepdim=True) < 0.0, -1.0, 1.0).to(points.dtype)
         far = distance > 1e-9
         normals = torch.where(far, side * away / torch.where(far, distance, torch.ones_like(distance)), smooth)
-        self._points, self._answer = points.clone(), (closest.positions, normals)
+        self._asked = None if points.is_inference() else (points, points._version)
+        self._answer = closest.positions, normals
         return self._answer
+
+    def _is_last(self, points: Tensor) -> bool:
+        """Whether these are the very points asked for last; comparing their values would wait for other devices."""
+        return self._asked is not None and points is self._asked[0] and points._version == self._asked[1]
 
 
 def plane_distance(x: Tensor, foot: Tensor, normal: Tensor) -> Tensor:
@@ -60,7 +65,10 @@ def closeness_terms(planes: Feet, vertices: Tensor, *, weight: float, block: str
 
 
 def distance_limit_terms(planes: Feet, limits: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
-    """Barrier that no vertex crosses: ``limits`` (V,) are the largest distances allowed; silent below half of it."""
+    """Barrier that no vertex crosses: ``limits`` (V,) are the largest distances allowed; silent below half of it.
+
+    The limits are on the device of the vertices.
+    """
 
     def limit(x: Tensor, foot: Tensor, normal: Tensor, most: Tensor) -> Tensor:
         return barrier(most - plane_distance(x, foot, normal).abs(), 0.5 * most)
@@ -68,5 +76,5 @@ def distance_limit_terms(planes: Feet, limits: Tensor, *, weight: float, block: 
     def refresh(state: State) -> tuple[Tensor, Tensor, Tensor]:
         return (*planes(state), limits)
 
-    every = torch.arange(limits.shape[0])[:, None]
-    return [ElementTerm("distance limit", limit, [(block, every)], weight=weight, refresh=refresh)]
+    stencil = [(block, torch.arange(limits.shape[0], device=limits.device)[:, None])]
+    return [ElementTerm("distance limit", limit, stencil, weight=weight, refresh=refresh)]

@@ -34,7 +34,7 @@ def eliminated_coplanar(x: Tensor) -> Tensor:
     """:func:`~torchfair.constraints.principal_symmetric.coplanar` at two vertices with four neighbours each."""
     first, second = x[:, :5], x[:, 5:]
     normals = [spheres_through(star[:, 0], star[:, 1:]).normals for star in (first, second)]
-    return coplanar(x[:, [0, 5]], torch.stack(normals, dim=1))
+    return coplanar(x[:, ::5], torch.stack(normals, dim=1))
 
 
 def eliminated_coplanar_derivative(x: Tensor) -> Tensor:

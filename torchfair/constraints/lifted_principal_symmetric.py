@@ -68,13 +68,13 @@ def lifted_principal_symmetric_terms(
     Raises:
         ShapeError: an end of an edge is no star.
     """
-    number = torch.arange(stars.vertices.shape[0])
+    number = torch.arange(stars.vertices.shape[0], device=stars.vertices.device)
     centres = stars.vertices.repeat_interleave(4)
     pairs = torch.stack([centres, stars.cospherical.reshape(-1)], dim=1)
     spheres = number.repeat_interleave(4)[:, None]
     sides = torch.cat([stars.vertices[:, None], stars.principal], dim=1)[is_saddle]
     saddles = number[is_saddle][:, None]
-    edge_numbers = torch.arange(edges.shape[0])[:, None]
+    edge_numbers = torch.arange(edges.shape[0], device=edges.device)[:, None]
     return [
         ElementTerm(COSPHERICAL, equal_distances, [(block, pairs), (CENTRES, spheres)], weight=weight),
         ElementTerm(

@@ -61,9 +61,8 @@ class SaddleSides:
     def __init__(self, stars: PrincipalStars, *, margin: float = 0.05, block: str = "vertices") -> None:
         self.stars, self.margin, self.block = stars, margin, block
         self.stencil = star_stencil(stars)
-        count = stars.vertices.shape[0]
-        self.is_saddle = torch.zeros(count, dtype=torch.bool)
-        self._preference = torch.ones(count, dtype=torch.float64)
+        self.is_saddle = torch.zeros_like(stars.vertices, dtype=torch.bool)
+        self._preference = torch.ones_like(stars.vertices, dtype=torch.float64)
         self._data: tuple[Tensor, ...] = ()
 
     def decide(self, vertices: Tensor) -> int:

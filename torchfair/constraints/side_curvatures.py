@@ -16,7 +16,6 @@ from ..principal.sphere_derivatives import sphere_derivatives
 from ..principal.spheres import spheres_through
 
 _TINY = 1e-24
-_PRINCIPAL, _COSPHERICAL = [0, 3], [1, 2, 4, 5]  # among the spokes
 
 
 def angle_excess(x: Tensor) -> Tensor:
@@ -41,9 +40,9 @@ def side_curvatures(x: Tensor) -> tuple[Tensor, Tensor]:
     of a circle that touches the plane orthogonal to n in v and passes through the neighbour.
     """
     spokes = x[:, 1:] - x[:, :1]
-    principal = spokes[:, _PRINCIPAL]
-    sphere = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]])
-    faces = unit(cross(spokes[:, [1, 4]], spokes[:, [2, 5]]))
+    principal = spokes[:, ::3]
+    sphere = spheres_through(x[:, 0], _cospherical(x[:, 1:]).flatten(1, 2))
+    faces = unit(cross(spokes[:, 1::3], spokes[:, 2::3]))
     normals = torch.cat([sphere.normals[:, None], faces], dim=1)
     heights = dot(normals[:, :, None], principal[:, None])
     return (2.0 * heights / dot(principal, principal).clamp_min(_TINY)[:, None]).flatten(1), sphere.curvatures
@@ -52,9 +51,9 @@ def side_curvatures(x: Tensor) -> tuple[Tensor, Tensor]:
 def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
     """Derivatives (n, 6, 6, 3) and (n, 6, 3) of both results of :func:`side_curvatures` by the spokes."""
     spokes = x[:, 1:] - x[:, :1]
-    principal = spokes[:, _PRINCIPAL]
-    sphere = spheres_through(x[:, 0], x[:, [2, 3, 5, 6]])
-    a, b = spokes[:, [1, 4]], spokes[:, [2, 5]]
+    principal = spokes[:, ::3]
+    sphere = spheres_through(x[:, 0], _cospherical(x[:, 1:]).flatten(1, 2))
+    a, b = spokes[:, 1::3], spokes[:, 2::3]
     products = cross(a, b)
     faces = unit(products)
     squares = dot(principal, principal).clamp_min(_TINY)[..., None]
@@ -62,12 +61,12 @@ def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
     normals = torch.cat([sphere.normals[:, None], faces], dim=1)
     sides = dot(normals[:, :, None], by_normal[:, None])  # (n, 3, 2)
     result = x.new_zeros(x.shape[0], 3, 2, 6, 3)
-    for number, spoke in enumerate(_PRINCIPAL):
+    for number, spoke in enumerate((0, 3)):
         result[:, :, number, spoke] = (
             2.0 * normals / squares[:, number, None] - sides[..., number, None] * by_normal[:, number, None]
         )
-    by_sphere, by_curvature = sphere_derivatives(spokes[:, _COSPHERICAL], sphere.normals, by_normal)
-    result[:, 0][:, :, _COSPHERICAL] = by_sphere
+    by_sphere, by_curvature = sphere_derivatives(_cospherical(spokes).flatten(1, 2), sphere.normals, by_normal)
+    _cospherical(result[:, 0]).copy_(by_sphere.view(x.shape[0], 2, 2, 2, 3))
     lengths = norm(products)[..., None]
     inverse = torch.where(lengths > 0, 1.0 / torch.where(lengths > 0, lengths, 1.0), 0.0)
     for face, (first, second) in enumerate(((1, 2), (4, 5))):
@@ -76,5 +75,13 @@ def side_curvatures_derivative(x: Tensor) -> tuple[Tensor, Tensor]:
         result[:, 1 + face, :, first] += cross(b[:, face, None], turned)
         result[:, 1 + face, :, second] += cross(turned, a[:, face, None])
     curvature = x.new_zeros(x.shape[0], 6, 3)
-    curvature[:, _COSPHERICAL] = by_curvature
+    _cospherical(curvature).copy_(by_curvature.view(x.shape[0], 2, 2, 3))
     return result.flatten(1, 2), curvature
+
+
+def _cospherical(around: Tensor) -> Tensor:
+    """w2, w3 and w5, w6 (..., 2, 2, 3) of w1, ..., w6 (..., 6, 3): a view.
+
+    A list for an index would be made a tensor and copied to the device at every call.
+    """
+    return around.view(*around.shape[:-2], 2, 3, 3)[..., 1:, :]

@@ -20,9 +20,8 @@ def star_crossings(x: Tensor) -> Tensor:
     """Depths of the crossings in the normal pyramid of a star: ``x`` (k+1, 3), centre first, to (k (k-3) / 2,)."""
     depths = crossing_depths(star_shape(x[1:] - x[0]).sectors)
     size = depths.shape[0]
-    first, second = torch.triu_indices(size, size, 2, device=x.device)
-    apart = (second - first) < size - 1  # the last arc is a neighbour of the first
-    return depths[first[apart], second[apart]]
+    rows = [depths[arc, arc + 2 :] for arc in range(1, size - 2)]  # neighbouring arcs do not cross
+    return torch.cat([depths[0, 2:-1], *rows])  # the last arc is a neighbour of the first
 
 
 def pyramid_terms(topology: Topology, *, weight: float, block: str = "vertices") -> list[ElementTerm]:

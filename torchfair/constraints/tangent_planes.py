@@ -156,7 +156,7 @@ def tangent_patch_terms(
 def tangent_frames(normals: Tensor) -> tuple[Tensor, Tensor]:
     """Two unit vectors (n, 3) orthogonal to unit ``normals`` and to each other."""
     smallest = normals.abs().argmin(1)
-    helper = torch.eye(3, dtype=normals.dtype)[smallest]
+    helper = torch.eye(3, dtype=normals.dtype, device=normals.device)[smallest]
     first = cross(normals, helper)
     first = first / vector_norm(first, dim=1, keepdim=True)
     return first, cross(normals, first)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import torch
 from torch import Tensor
 
-from ..errors import MeshError, ShapeError
+from .._numbers import is_number
+from ..errors import MeshError, SettingsError, ShapeError
 from ..geometry import degenerate_faces
 from ..topology import Topology
 
@@ -34,14 +36,17 @@ def refuse_degenerate_faces(vertices: Tensor, topology: Topology) -> None:
 
 
 def check_choice(settings: object, name: str, allowed: Sequence[str]) -> None:
-    """Raises ValueError unless the attribute ``name`` of the settings is one of the words ``allowed``."""
+    """Raises SettingsError unless the attribute ``name`` of the settings is one of the words ``allowed``."""
     value = getattr(settings, name)
     if value not in allowed:
-        raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")
+        raise SettingsError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")
 
 
 def check_weights(settings: object) -> None:
-    """Raises ValueError if a weight among the settings is negative or NaN."""
-    weights = [name for name in vars(settings) if name.endswith("_weight") and not getattr(settings, name) >= 0.0]
-    if weights:
-        raise ValueError(f"weights must be at least 0: {', '.join(weights)}")
+    """Raises SettingsError if a weight among the settings is no number, negative, infinite or NaN."""
+    weights = {name: value for name, value in vars(settings).items() if name.endswith("_weight")}
+    wrong = [
+        f"{name}={value!r}" for name, value in weights.items() if not (is_number(value) and 0.0 <= value < math.inf)
+    ]
+    if wrong:
+        raise SettingsError(f"weights must be at least 0: {', '.join(wrong)}; give finite numbers")

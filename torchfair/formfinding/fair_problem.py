@@ -87,13 +87,18 @@ class FairProblem:
         self._other_goals = self._other_goals or steps > 1
         return [(i + 1) / steps for i in range(steps)]
 
-    def terms(self, share: float) -> list[ElementTerm]:
-        """Element terms of a stage; a share above 1 raises planarity beyond its weight."""
+    def terms(self, share: float, blur: float = 1.0) -> list[ElementTerm]:
+        """Element terms of a stage.
+
+        Args:
+            share: See :meth:`shares`; above 1 it raises planarity beyond its weight.
+            blur: Factor of the smoothing of the absolute value.
+        """
         settings = self.settings
         targets = self.vertices[self.handles].lerp(self.targets, min(share, 1.0))
         planarity_weight = max(settings.planarity_weight, 1.0) ** share if settings.planarity_weight else 0.0
         return [
-            *self._energy(),
+            *self._energy(blur),
             *self._common,
             *c.handle_terms(self.handles, targets, weight=settings.handle_weight),
             *c.planarity_terms(self.topology, self.planar_faces, weight=planarity_weight),
@@ -144,10 +149,11 @@ class FairProblem:
 
     # ---- terms -----------------------------------------------------------------------------------------
 
-    def _energy(self) -> list[ElementTerm]:
+    def _energy(self, blur: float) -> list[ElementTerm]:
         settings = self.settings
         if settings.formulation == "reduced":
-            return c.normal_variation_terms(self.topology, smoothing=settings.smoothing, weight=settings.energy_weight)
+            smoothing = blur * settings.smoothing
+            return c.normal_variation_terms(self.topology, smoothing=smoothing, weight=settings.energy_weight)
         planar = self.topology.face_sizes == 3
         planar[self.planar_faces] = True
         return lifted_normal_variation_terms(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from ..errors import SettingsError
 from ..projection import ProjectionSettings
 from .checks import check_choice, check_weights
 
@@ -72,7 +73,7 @@ class FormSettings:
         check_choice(self, "formulation", FORMULATIONS)
         check_weights(self)
         if not 0.0 < self.smoothing <= self.coarse_smoothing < math.inf:
-            raise ValueError(
+            raise SettingsError(
                 f"smoothing must be positive and at most coarse_smoothing, got {self.smoothing} and "
                 f"{self.coarse_smoothing}"
             )

@@ -10,19 +10,18 @@ from torch import Tensor
 
 from ..energies import normal_variation
 from ..normalisation import Normalisation
-from ..projection import Callback, ProjectionResult, Status, guided_projection
+from ..projection import Callback, ProjectionResult
 from ..projection.layout import State
 from ..topology import Topology
 from .checks import one_start
 from .fair_problem import FairProblem
 from .fair_report import fair_measures
+from .fair_stages import FairStages
 from .handles import read_handles
 from .settings import FairSettings
 
 Mesh = tuple[Tensor, Topology]
 
-_SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
-_LARGEST_SHARE = 1.3
 _HANDLE_REACHED = 0.05  # mean edge lengths
 
 
@@ -34,8 +33,8 @@ class FairResult:
         vertices: (V, 3) in the unit and dtype of the input.
         projection: Status, history and residual table of the iteration, in normalised units
             (energies in the history are in the unit of the input).
-        preparation: Earlier stages, where handles travel far or faces have to become planar: their
-            constraints are imposed step by step. The merit falls within each stage.
+        preparation: Earlier stages: with a blunter absolute value, and where handles travel far or faces have to
+            become planar, with constraints imposed step by step. The merit falls within each stage.
         before, after: Energies and the quantities that the job guarantees, see ``fair_measures``.
         notes: What the job decided on its own, in words.
     """
@@ -98,24 +97,7 @@ def minimise_normal_variation(
     def observe(state: State) -> dict[str, float]:
         return {"normal_variation": normalisation.length * float(normal_variation(problem.placed(state), topology))}
 
-    runs: list[ProjectionResult] = []
-    shares = problem.shares()
-    while shares:
-        share = shares.pop(0)
-        run = guided_projection(
-            problem.blocks(runs[-1].blocks["vertices"] if runs else problem.vertices),
-            problem.terms(share),
-            fixed=problem.fixed,
-            settings=settings.stage() if share < 1.0 else settings.projection,
-            callback=callback,
-            observe=observe,
-            guard=problem.admits,
-        )
-        runs.append(run)
-        if run.status in (Status.INTERRUPTED, Status.CALLBACK):
-            break
-        if not shares and share < _LARGEST_SHARE and not problem.is_planar(problem.placed(run.blocks)):
-            shares.append(share + _SHARE_STEP)
+    runs = list(FairStages(problem, callback, observe))
     state = problem.placed(runs[-1].blocks)
     moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(state))
     after = fair_measures(moved, start, topology, problem, normalisation)

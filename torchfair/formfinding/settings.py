@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+from .._numbers import check_number
+from ..errors import SettingsError
 from ..projection import ProjectionSettings
 from .checks import check_choice, check_weights
 
@@ -15,7 +17,7 @@ FORMULATIONS = ("reduced", "lifted")
 
 def _default_projection() -> ProjectionSettings:
     return ProjectionSettings(
-        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=1e-3, patience=3
+        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=2e-3, patience=6
     )
 
 
@@ -46,6 +48,7 @@ class FairSettings:
         smallest_area: No face falls below this fraction of its area.
         quality_weight: Weight of the barriers before those bounds.
         smoothing: ``l l*`` below this is treated as flat.
+        continuation: Factors of ``smoothing`` in stages before the last, falling; empty for the last stage alone.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables too.
         constraint_weight: Weight of the constraints that define the auxiliary variables.
         projection: Iterations, tolerances, damping and linear solver.
@@ -66,6 +69,7 @@ class FairSettings:
     smallest_area: float = 0.2
     quality_weight: float = 0.1
     smoothing: float = 1e-2
+    continuation: tuple[float, ...] = (10.0, 3.0)
     formulation: str = "reduced"
     constraint_weight: float = 1e5
     projection: ProjectionSettings = field(default_factory=_default_projection)
@@ -75,10 +79,13 @@ class FairSettings:
         check_choice(self, "formulation", FORMULATIONS)
         check_weights(self)
         if isinstance(self.planar, str) and self.planar not in PLANAR:
-            raise ValueError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
-        if self.distance_limit is not None and not self.distance_limit > 0.0:
-            raise ValueError(f"distance_limit must be positive or None, got {self.distance_limit}")
+            raise SettingsError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
+        if not all(1.0 < factor < math.inf for factor in self.continuation):
+            raise SettingsError(f"continuation must hold finite factors above 1, got {self.continuation}")
+        if self.distance_limit is not None:
+            check_number("distance_limit (or None)", self.distance_limit, above=True)
 
     def stage(self) -> ProjectionSettings:
         """Settings of a stage before the last: fewer steps, wider tolerance."""
-        return replace(self.projection, max_iterations=min(15, self.projection.max_iterations), merit_tolerance=1e-2)
+        most = min(20, self.projection.max_iterations)
+        return replace(self.projection, max_iterations=most, merit_tolerance=1e-2, patience=6)

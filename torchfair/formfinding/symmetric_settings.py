@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from .._numbers import check_count, check_number
 from ..projection import ProjectionSettings
 from .checks import check_choice, check_weights
 
@@ -71,7 +72,7 @@ class SymmetricSettings:
         check_choice(self, "boundary", BOUNDARIES)
         check_choice(self, "formulation", FORMULATIONS)
         check_weights(self)
-        if not self.constraint_weight > 0.0 or not self.tight_weight > 0.0:
-            raise ValueError("constraint_weight and tight_weight must be above 0")
-        if self.most_steps < 1 or self.rounds < 1:
-            raise ValueError("most_steps and rounds must be at least 1")
+        for name in ("constraint_weight", "tight_weight"):
+            check_number(name, getattr(self, name), above=True)
+        for name in ("most_steps", "rounds"):
+            check_count(name, getattr(self, name), least=1)

@@ -13,6 +13,14 @@ from ._closest_boxes import Floats, Ints
 _LARGEST = 1e70  # beyond it squared areas leave the range of float64
 
 
+def check_points(points: Tensor, what: str) -> None:
+    """Raises ShapeError unless ``points`` is a floating tensor (N, 3). Values are not read."""
+    if not isinstance(points, Tensor):
+        raise ShapeError(what, "a floating tensor (N, 3)", type(points).__name__)
+    if points.dim() != 2 or points.shape[1] != 3 or not points.is_floating_point():
+        raise ShapeError(what, "a floating tensor (N, 3)", f"{tuple(points.shape)} {points.dtype}")
+
+
 def to_columns(points: Tensor, what: str) -> Floats:
     """Checked coordinates (3, N) in float64.
 
@@ -20,10 +28,7 @@ def to_columns(points: Tensor, what: str) -> Floats:
         ShapeError: if ``points`` is not a floating tensor (N, 3).
         MeshError: if a coordinate is not finite or beyond 1e70.
     """
-    if not isinstance(points, Tensor):
-        raise ShapeError(what, "a floating tensor (N, 3)", type(points).__name__)
-    if points.dim() != 2 or points.shape[1] != 3 or not points.is_floating_point():
-        raise ShapeError(what, "a floating tensor (N, 3)", f"{tuple(points.shape)} {points.dtype}")
+    check_points(points, what)
     columns: Floats = np.ascontiguousarray(points.detach().cpu().double().numpy().T)
     usable = (np.abs(columns) <= _LARGEST).all(0)  # false for NaN
     if not usable.all():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import torch
@@ -12,7 +12,8 @@ from torch import Tensor
 from .._connectivity import first_few
 from ..errors import MeshError, ShapeError
 from ._closest_boxes import Floats, Ints
-from ._closest_points import to_columns, to_tensor
+from ._closest_points import check_points, to_columns
+from ._closest_query import Kind, ask
 from ._closest_search import nearest_pieces
 from ._closest_segments import Segments
 
@@ -55,6 +56,8 @@ class ReferenceCurves:
             beyond 1e70.
     """
 
+    _answer: ClassVar[tuple[Kind, ...]] = ("vector", "number", "index", "number", "vector")
+
     def __init__(self, curves: Sequence[Tensor], closed: Sequence[bool]) -> None:
         if len(curves) != len(closed):
             raise ShapeError("closed", f"one bool for each of {len(curves)} curves", len(closed))
@@ -80,24 +83,22 @@ class ReferenceCurves:
             ShapeError: if ``points`` is not a floating tensor (N, 3) or ``curves`` not an integer tensor (N,).
             MeshError: if a coordinate is not finite or beyond 1e70, or there is no curve of that number.
         """
-        columns = to_columns(points, "points")
-        owners = self._owners(curves, columns.shape[1])
-        pieces = nearest_pieces(self._segments, self._segments.place(columns, owners))
-        squared, positions, fractions = self._segments.locate(columns, pieces)
-        return ClosestCurvePoints(
-            positions=to_tensor(positions.T, points),
-            distances=to_tensor(np.sqrt(squared), points),
-            segments=to_tensor(self._numbers[pieces], points),
-            fractions=to_tensor(fractions, points),
-            tangents=to_tensor(self._segments.tangents[:, pieces].T, points),
-        )
-
-    def _owners(self, curves: Tensor, count: int) -> Ints:
-        expected = f"an integer tensor ({count},), the curve of each point"
+        check_points(points, "points")
+        expected = f"an integer tensor ({points.shape[0]},), the curve of each point"
         if not isinstance(curves, Tensor):
             raise ShapeError("curves", expected, type(curves).__name__)
-        if curves.shape != (count,) or curves.is_floating_point() or curves.dtype == torch.bool:
+        if curves.shape != points.shape[:1] or curves.is_floating_point() or curves.dtype == torch.bool:
             raise ShapeError("curves", expected, f"{tuple(curves.shape)} {curves.dtype}")
+        return ClosestCurvePoints(*ask(self, points, curves))
+
+    def _search(self, points: Floats, owners: Tensor | None) -> Sequence[Floats | Ints]:
+        assert owners is not None
+        pieces = nearest_pieces(self._segments, self._segments.place(points, self._checked(owners)))
+        squared, positions, fractions = self._segments.locate(points, pieces)
+        tangents = self._segments.tangents[:, pieces]
+        return positions.T, np.sqrt(squared), self._numbers[pieces], fractions, tangents.T
+
+    def _checked(self, curves: Tensor) -> Ints:
         owners = curves.detach().cpu().numpy().astype(np.int64)
         wrong = np.flatnonzero((owners < 0) | (owners >= self._curve_count))
         if wrong.size:
@@ -128,7 +129,7 @@ class ReferenceCurve:
 
     def closest(self, points: Tensor) -> ClosestCurvePoints:
         """Closest points of ``points`` (N, 3); see :meth:`ReferenceCurves.closest`."""
-        return self._curves.closest(points, torch.zeros(points.shape[:1], dtype=torch.int64))
+        return self._curves.closest(points, torch.zeros(points.shape[:1], dtype=torch.int64, device=points.device))
 
 
 def _segment_ends(points: Floats, closed: bool, curve: int) -> tuple[Floats, Floats]:

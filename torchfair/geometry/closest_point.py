@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import torch
@@ -12,7 +13,8 @@ from ..errors import MeshError
 from ..topology import Topology
 from ._closest_boxes import Floats, Ints
 from ._closest_cut import cut_faces
-from ._closest_points import to_columns, to_tensor
+from ._closest_points import to_columns
+from ._closest_query import Kind, ask
 from ._closest_search import nearest_pieces
 from ._closest_tracker import PieceTracker
 from ._closest_triangles import Triangles, dot
@@ -43,6 +45,9 @@ class ClosestPoints(NamedTuple):
     smooth_normals: Tensor
     pieces: Tensor
     weights: Tensor
+
+
+_ANSWER: tuple[Kind, ...] = ("vector", "number", "index", "vector", "vector", "index", "vector")
 
 
 class ReferenceSurface:
@@ -86,6 +91,8 @@ class ReferenceSurface:
         tensor([5., 1.])
     """
 
+    _answer: ClassVar[tuple[Kind, ...]] = _ANSWER
+
     def __init__(self, vertices: Tensor, topology: Topology) -> None:
         topology.check_vertices(vertices)
         if topology.num_faces == 0:
@@ -123,26 +130,21 @@ class ReferenceSurface:
             ShapeError: if ``points`` is not a floating tensor (N, 3).
             MeshError: if a coordinate is not finite or beyond 1e70; the first few such rows are named.
         """
-        columns = to_columns(points, "points")
-        return self._describe(points, columns, nearest_pieces(self._triangles, columns))
+        return ClosestPoints(*ask(self, points))
+
+    def _search(self, points: Floats, owners: Tensor | None) -> Sequence[Floats | Ints]:
+        return self._describe(points, nearest_pieces(self._triangles, points))
 
     def tracker(self) -> ClosestPointTracker:
         """A :class:`ClosestPointTracker` on this surface."""
         return ClosestPointTracker(self)
 
-    def _describe(self, points: Tensor, columns: Floats, pieces: Ints) -> ClosestPoints:
-        squared, positions, weights = self._triangles.locate(columns, pieces)
+    def _describe(self, points: Floats, pieces: Ints) -> Sequence[Floats | Ints]:
+        squared, positions, weights = self._triangles.locate(points, pieces)
         flat = self._normals.take(pieces, axis=1)
         smooth = _unit(dot(weights[:, None], self._corner_normals.take(pieces, axis=2)), flat)
-        return ClosestPoints(
-            positions=to_tensor(positions.T, points),
-            distances=to_tensor(np.sqrt(squared), points),
-            faces=to_tensor(self._piece_faces.take(pieces), points),
-            normals=to_tensor(flat.T, points),
-            smooth_normals=to_tensor(smooth.T, points),
-            pieces=to_tensor(pieces, points),
-            weights=to_tensor(weights.T, points),
-        )
+        faces = self._piece_faces.take(pieces)
+        return positions.T, np.sqrt(squared), faces, flat.T, smooth.T, pieces, weights.T
 
 
 class ClosestPointTracker:
@@ -157,14 +159,18 @@ class ClosestPointTracker:
         surface: where closest points are sought.
     """
 
+    _answer: ClassVar[tuple[Kind, ...]] = _ANSWER
+
     def __init__(self, surface: ReferenceSurface) -> None:
         self.surface = surface
         self._tracker = PieceTracker(surface._triangles)
 
     def closest(self, points: Tensor) -> ClosestPoints:
         """Closest points of ``points`` (N, 3); see :meth:`ReferenceSurface.closest`."""
-        columns = to_columns(points, "points")
-        return self.surface._describe(points, columns, self._tracker.nearest(columns))
+        return ClosestPoints(*ask(self, points))
+
+    def _search(self, points: Floats, owners: Tensor | None) -> Sequence[Floats | Ints]:
+        return self.surface._describe(points, self._tracker.nearest(points))
 
 
 def _unit(vectors: Floats, otherwise: Floats) -> Floats:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import copy
 
 import torch
+from torch import Tensor
 
 from ..errors import ShapeError
+from .declarations import check_declarations
 from .layout import Layout
-from .term import ElementTerm
+from .term import ElementTerm, Residual
 
 
 class CompiledTerm:
@@ -18,10 +20,12 @@ class CompiledTerm:
         unknowns: (K, n) flat number of each unknown of each element.
         nodes: (k, n) node number of each row of the stencil, all blocks together.
         widths: number of unknowns of each of the k rows.
+        verified: functions of a term on this stencil that were found to be what it declares, see :meth:`verify`.
     """
 
     def __init__(self, term: ElementTerm, layout: Layout) -> None:
         self.term = term
+        self.verified: tuple[Residual, Residual | None, bool] | None = None
         unknowns, nodes, self.widths = [], [], []
         for name, index in term.stencil:
             width = layout.sizes[name][1]
@@ -32,6 +36,13 @@ class CompiledTerm:
             self.widths += [width] * index.shape[1]
         self.unknowns = torch.cat(unknowns, dim=1).T.contiguous()
         self.nodes = torch.cat(nodes, dim=1).T.contiguous()
+
+    def verify(self, arguments: tuple[Tensor, ...]) -> None:
+        """Tries at a few elements what the term declares; once, also for later data, weights and losses."""
+        functions = (self.term.residual, self.term.jacobian, self.term.batched)
+        if self.verified != functions:
+            check_declarations(self.term, arguments)
+            self.verified = functions
 
     def with_term(self, term: ElementTerm) -> CompiledTerm:
         """The same numbers for a term on the same stencil."""

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import torch
 
 from ..errors import TorchfairError
+from .declarations import check_declarations
 from .layout import State
 from .loss import apply_root
 from .result import TermResidual
-from .system import Evaluation, Structure
+from .start_checks import check_finite, check_merit, check_origin, first_bad_elements, rows
+from .system import Evaluation, LinearSystem, Structure
 from .term import ElementTerm
 
 
@@ -53,18 +55,14 @@ def residual_tables(structure: Structure, terms: Sequence[ElementTerm], at: Eval
     return tables
 
 
-def first_bad_elements(term: ElementTerm, state: State) -> list[int]:
-    """Elements whose residual or Jacobian is not finite."""
-    values, jacobians = term.derivatives(term.arguments(state))
-    bad = ~(torch.isfinite(values).all(1) & torch.isfinite(jacobians).flatten(1).all(1))
-    return [int(i) for i in torch.nonzero(bad).squeeze(1)]
-
-
 def check_start(structure: Structure, start: Evaluation) -> None:
-    """Raises TorchfairError if the start or its merit is not finite, or a linear term is not; names block or term."""
+    """Raises TorchfairError if the start or its merit is not finite, or a term is not what it is declared to be.
+
+    Linear terms have to be linear, closed forms the derivatives of their residuals; the error names block or term.
+    """
     state = start.state
     for name, block in state.items():
-        bad = torch.nonzero(~torch.isfinite(block).all(1)).squeeze(1).tolist()
+        bad = rows(~torch.isfinite(block))
         if bad:
             raise TorchfairError(f"block '{name}' is not finite in rows {bad[:5]}: repair the start")
     if bool(torch.isfinite(start.merits).all()):
@@ -72,15 +70,38 @@ def check_start(structure: Structure, start: Evaluation) -> None:
         misfit = affine.misfit(state, structure.layout.flatten(state)) if affine is not None else None
         if misfit is not None:
             raise TorchfairError(f"term '{misfit}' is declared linear, but its residual is not: leave out linear=True")
+        for compiled, arguments, values in zip(structure.compiled, start.arguments, start.values, strict=True):
+            compiled.verify(arguments)
+            if float(start.merits.min()) < 0.0:
+                check_merit(compiled.term, arguments, values)
+        for term in structure.terms:
+            if term.linear:
+                check_declarations(term, term.arguments(state))
         return
     for term in structure.terms:
-        bad = first_bad_elements(term, state)
+        arguments = term.arguments(state)
+        values = term.values(arguments)
+        check_finite(term, arguments, values)
+        check_merit(term, arguments, values)
+        if term.linear:
+            check_origin(term, structure.layout)
+    raise TorchfairError("the merit overflows at the start although every residual is finite: lower the weights")
+
+
+def check_linearised(structure: Structure, system: LinearSystem) -> None:
+    """Raises TorchfairError if a Jacobian is not finite at the start; names the term and its elements.
+
+    Costs nothing where all is well: the gradient, which is known, is finite only if every derivative is.
+    """
+    if bool(torch.isfinite(system.gradient).all()):
+        return
+    for compiled, jacobians in zip(structure.compiled, system.jacobians, strict=True):
+        bad = rows(~torch.isfinite(jacobians.permute(2, 0, 1)))
         if bad:
             raise TorchfairError(
-                f"the residual of term '{term.name}' is not finite at the start, elements {bad[:5]}: "
-                "move the start away from the singular place or leave these elements out"
+                f"the derivative of term '{compiled.term.name}' is not finite at the start, elements {bad[:5]}, "
+                "although the residual is: move the start away from the kink, or smooth the residual there"
             )
-    raise TorchfairError("the merit overflows at the start although every residual is finite: lower the weights")
 
 
 def culprit(structure: Structure, state: State) -> str:

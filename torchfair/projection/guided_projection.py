@@ -35,8 +35,11 @@ def guided_projection(
     true losses of all terms, falls. Constraints are terms with large weights, targets terms with small ones
     (guided projection after Tang et al. 2014; paper section 5.1).
 
+    The solve is not differentiated through: blocks and data that require gradients are detached, silently, and the
+    result requires none.
+
     Args:
-        blocks: Start, ``name -> (n, d)``, all of one floating dtype and device. Not modified.
+        blocks: Start, ``name -> (n, d)``, all float32 or all float64, on one device. Not modified.
         terms: What is to be small. See :class:`ElementTerm`.
         fixed: Masks ``(n,)`` or ``(n, d)`` by block name, True where an unknown stays as it is.
         settings: Tolerances, damping, linear solver.
@@ -50,10 +53,14 @@ def guided_projection(
         The best state found. Interrupting (Ctrl-C) returns it too, with ``Status.INTERRUPTED``.
 
     Raises:
-        ShapeError: blocks, terms or masks do not fit together.
-        TorchfairError: a residual or Jacobian is not finite at the start; names the term and its elements.
+        ShapeError: blocks, terms or masks do not fit together, or a function of a term returns something else
+            than a tensor of the right shape and dtype.
+        SettingsError: unknown linear solver, or settings that are none.
+        TorchfairError: a residual or Jacobian is not finite at the start; names the term and its elements. Likewise
+            where a function of a term raises an error, which is its cause, a closed form is not the derivative, or a
+            linear term is not linear.
     """
-    settings = settings or ProjectionSettings()
+    settings = ProjectionSettings.given(settings)
     problem = GuidedProjection(blocks, terms, fixed=fixed, solver=settings.solver)
     return problem.solve(blocks, settings=settings, callback=callback, observe=observe, guard=guard)
 
@@ -81,7 +88,7 @@ class GuidedProjection(Problem):
         The linear solver is that of the constructor, unless the settings name another one, which is then kept for the
         next time.
         """
-        settings = settings or ProjectionSettings()
+        settings = ProjectionSettings.given(settings)
         problem = self.solved_by(settings.solver)
         with torch.no_grad(), threads_for(self.layout.num_unknowns, self.structure.device):
             return Run(problem, blocks, settings, callback, observe, guard).result()
@@ -97,7 +104,7 @@ class GuidedProjection(Problem):
             ShapeError: blocks are not ``(batch, n, d)`` of the sizes compiled for.
             TorchfairError: see :func:`guided_projection`.
         """
-        settings = settings or ProjectionSettings()
+        settings = ProjectionSettings.given(settings)
         counts = {block.shape[0] for block in blocks.values()}
         if len(counts) != 1 or any(block.ndim != 3 for block in blocks.values()):
             shapes = [tuple(block.shape) for block in blocks.values()]

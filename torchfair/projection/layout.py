@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from .._shown import shown
 from ..errors import ShapeError
 
 State = Mapping[str, Tensor]
@@ -23,19 +24,38 @@ class Layout:
 
     Attributes:
         sizes: ``(n, d)`` of every block, in order, all members together.
+        dtype: Of all blocks, float32 or float64.
+        device: Of all blocks.
         members: How many there are.
     """
 
     sizes: dict[str, tuple[int, int]]
+    dtype: torch.dtype
+    device: torch.device
     members: int = 1
 
     @classmethod
     def of(cls, state: State) -> Layout:
-        """Layout of unbatched blocks ``(n, d)``."""
+        """Layout of unbatched blocks ``(n, d)``.
+
+        Raises:
+            ShapeError: there is no block, or one that is not ``(n, d)``, float32 or float64, and like the first.
+        """
+        if not isinstance(state, Mapping) or not state:
+            raise ShapeError("blocks", 'at least one, such as {"vertices": vertices}', shown(state))
+        first = next(iter(state.values()))
         for name, block in state.items():
-            if block.ndim != 2 or not block.is_floating_point():
-                raise ShapeError(f"block '{name}'", "a floating tensor (n, d)", f"{tuple(block.shape)} {block.dtype}")
-        return cls({name: (block.shape[0], block.shape[1]) for name, block in state.items()})
+            if not isinstance(block, Tensor) or block.layout != torch.strided or block.ndim != 2 or not block.shape[1]:
+                raise ShapeError(f"block '{name}'", "a dense tensor (n, d), (n, 1) for one number each", shown(block))
+            if block.dtype not in (torch.float32, torch.float64):
+                raise ShapeError(f"block '{name}'", "a tensor of float32 or float64", shown(block))
+            if block.dtype != first.dtype or block.device != first.device:
+                raise ShapeError(f"block '{name}'", f"{first.dtype} on {first.device} like the others", shown(block))
+        sizes = {name: (block.shape[0], block.shape[1]) for name, block in state.items()}
+        return cls(sizes, first.dtype, first.device)
+
+    def __str__(self) -> str:
+        return f"{self.sizes} {self.dtype} on {self.device}"
 
     @property
     def num_unknowns(self) -> int:
@@ -93,14 +113,16 @@ class Layout:
 
     def free_mask(self, fixed: Mapping[str, Tensor], device: torch.device) -> Tensor:
         """True where an unknown may move; the masks ``(n,)`` or ``(n, d)`` in ``fixed`` are True where it may not."""
+        if not isinstance(fixed, Mapping):
+            raise ShapeError("fixed", 'masks by block name, such as {"vertices": mask}', shown(fixed))
         free = {name: torch.ones(size, dtype=torch.bool, device=device) for name, size in self.sizes.items()}
         for name, mask in fixed.items():
             if name not in self.sizes:
                 raise ShapeError("fixed", f"block names among {list(self.sizes)}", f"'{name}'")
             n, d = self.sizes[name]
-            if mask.dtype != torch.bool or tuple(mask.shape) not in ((n,), (n, d)):
-                raise ShapeError(
-                    f"fixed['{name}']", f"a bool mask ({n},) or ({n}, {d})", f"{tuple(mask.shape)} {mask.dtype}"
-                )
+            is_mask = isinstance(mask, Tensor) and mask.dtype == torch.bool
+            if not is_mask or tuple(mask.shape) not in ((n,), (n, d)):
+                what = f"a bool mask ({n},) or ({n}, {d}), a tensor that is True where an unknown stays as it is"
+                raise ShapeError(f"fixed['{name}']", what, shown(mask))
             free[name] &= ~(mask[:, None] if mask.ndim == 1 else mask).to(device)
         return self.flatten(free)

@@ -8,6 +8,8 @@ from typing import ClassVar, Protocol
 import torch
 from torch import Tensor
 
+from .._numbers import check_number
+
 
 class Loss(Protocol):
     """What an element's residual costs, and the quadratic model of that cost.
@@ -54,9 +56,18 @@ class SmoothAbsolute:
     The quadratic model with weight ``1 / sqrt(|r_prev|^2 + epsilon^2)`` lies above the smoothed norm and
     touches it at ``r_prev``, so that a step which lowers the model lowers the merit (paper section 5.3,
     "weight iteration").
+
+    Attributes:
+        epsilon: Above 0, in the unit of the residual.
+
+    Raises:
+        SettingsError: epsilon is not a finite number above 0.
     """
 
     epsilon: float
+
+    def __post_init__(self) -> None:
+        check_number("epsilon of SmoothAbsolute", self.epsilon, above=True, finite=True)
 
     def value(self, residuals: Tensor) -> Tensor:
         """``sqrt(|r|^2 + epsilon^2) - epsilon``, evaluated without cancellation."""

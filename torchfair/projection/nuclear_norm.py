@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from .._numbers import check_number
+from ..errors import ShapeError
+
 
 @dataclass(frozen=True)
 class SmoothNuclearNorm:
@@ -17,12 +20,23 @@ class SmoothNuclearNorm:
     eigenvalues. The quadratic model ``tr(W (W_prev^2 + epsilon^2)^(-1/2) W) / 2`` lies above it and touches it
     at ``W_prev`` (the trace of the square root is concave), so eigenvectors need not be differentiated:
     the paper's weight iteration (section 5.3) for matrices.
+
+    Attributes:
+        epsilon: Above 0, in the unit of the matrix.
+
+    Raises:
+        SettingsError: epsilon is not a finite number above 0.
     """
 
     epsilon: float
 
+    def __post_init__(self) -> None:
+        check_number("epsilon of SmoothNuclearNorm", self.epsilon, above=True, finite=True)
+
     def value(self, residuals: Tensor) -> Tensor:
-        """Smoothed nuclear norms (n,), evaluated without cancellation."""
+        """Smoothed nuclear norms (n,), evaluated without cancellation; ShapeError unless residuals are ``(n, 6)``."""
+        if residuals.shape[1:] != (6,):
+            raise ShapeError("residuals of SmoothNuclearNorm", "(n, 6) symmetric_components", tuple(residuals.shape))
         squared = torch.linalg.eigvalsh(symmetric_matrix(residuals)).square()
         value: Tensor = (squared / (torch.sqrt(squared + self.epsilon**2) + self.epsilon)).sum(1)
         return value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 import torch
@@ -11,6 +12,7 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from ..linear import DenseQR, LinearSolver, choose_solver
+from .checks import listed
 from .layout import Layout, State
 from .replicate import replicated
 from .system import Structure
@@ -43,18 +45,11 @@ class Problem:
         fixed: Mapping[str, Tensor] | None = None,
         solver: str | LinearSolver = "auto",
     ) -> None:
-        if not blocks or not terms:
-            raise ShapeError("guided projection", "at least one block and one term", f"{len(blocks)} and {len(terms)}")
-        first = next(iter(blocks.values()))
-        for name, block in blocks.items():
-            if block.dtype != first.dtype or block.device != first.device:
-                raise ShapeError(
-                    f"block '{name}'", f"{first.dtype} on {first.device}", f"{block.dtype} on {block.device}"
-                )
-        self.terms, self._dtype = list(terms), first.dtype
+        self.terms = listed(terms)
         self.layout = Layout.of(blocks)
-        free = self.layout.free_mask(fixed or {}, first.device)
-        self.structure = Structure(self.layout, self.terms, free, first.dtype)
+        free = self.layout.free_mask({} if fixed is None else fixed, self.layout.device)
+        with torch.no_grad():
+            self.structure = Structure(self.layout, self.terms, free, self.layout.dtype)
         self._asked: str | LinearSolver = solver
         self._others: dict[object, Problem] = {}
         self.solver = choose_solver(solver, self.structure) if isinstance(solver, str) else solver
@@ -82,8 +77,9 @@ class Problem:
         """
         result = copy.copy(self)
         result._others = {}
-        result.terms = list(terms)
-        result.structure = self.structure.with_terms(terms)
+        result.terms = listed(terms)
+        with torch.no_grad():
+            result.structure = self.structure.with_terms(result.terms)
         if not result.structure.shares_pattern(self.structure):
             result.solver = copy.copy(self.solver)  # each keeps the analysis of its own pattern
         return result
@@ -95,19 +91,21 @@ class Problem:
         """
         result = copy.copy(self)
         result._others = {}
-        result.layout = Layout({name: (count * n, d) for name, (n, d) in self.layout.sizes.items()}, count)
+        sizes = {name: (count * n, d) for name, (n, d) in self.layout.sizes.items()}
+        result.layout = replace(self.layout, sizes=sizes, members=count)
         result.terms = [replicated(term, self.layout, count) for term in self.terms]
         parts = self.layout.unflatten(self.structure.free)
         free = torch.cat([part.repeat(count, 1).flatten() for part in parts.values()])
-        result.structure = Structure(result.layout, result.terms, free, self._dtype)
+        result.structure = Structure(result.layout, result.terms, free, self.layout.dtype)
         dense = isinstance(self.solver, DenseQR)
         result.solver = choose_solver("auto", result.structure) if dense else copy.copy(self.solver)
         return result
 
     def check_blocks(self, blocks: State) -> None:
-        """Raises ShapeError unless blocks have the sizes that the terms were compiled for."""
-        if Layout.of(blocks).sizes != self.layout.sizes:
-            raise ShapeError("blocks", str(self.layout.sizes), str(Layout.of(blocks).sizes))
+        """Raises ShapeError unless blocks have sizes, dtype and device that the terms were compiled for."""
+        given = Layout.of(blocks)
+        if given != replace(self.layout, members=1):
+            raise ShapeError("blocks", f"{self.layout} as compiled", str(given))
 
     def prepare(self) -> None:
         """Symbolic analysis; costs nothing where it is known."""

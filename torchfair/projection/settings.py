@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .._numbers import check_count, check_number
+from .._shown import shown
+from ..errors import SettingsError
 from ..linear import LinearSolver
 
 
@@ -34,6 +37,9 @@ class ProjectionSettings:
         accuracy: Relative remainder with which an iterative linear solver starts; tightened as the merit
             settles.
         solver: Name of a linear solver (see ``choose_solver``) or an object with that protocol.
+
+    Raises:
+        SettingsError: a setting is out of its range; names it.
     """
 
     max_iterations: int = 100
@@ -49,8 +55,30 @@ class ProjectionSettings:
     accuracy: float = 1e-2
     solver: str | LinearSolver = "auto"
 
+    @classmethod
+    def given(cls, settings: object) -> ProjectionSettings:
+        """Settings as given, or the defaults for None; SettingsError for anything else."""
+        if settings is None:
+            return cls()
+        if not isinstance(settings, cls):
+            raise SettingsError(f"settings must be ProjectionSettings(...) or None, got {shown(settings)}")
+        return settings
+
     def __post_init__(self) -> None:
         if self.damping_scale not in ("diagonal", "identity"):
-            raise ValueError(f"damping_scale must be 'diagonal' or 'identity', got {self.damping_scale!r}")
-        if self.max_iterations < 0 or not self.initial_damping > 0.0:
-            raise ValueError("max_iterations must be at least 0 and initial_damping above 0")
+            raise SettingsError(f"damping_scale must be 'diagonal' or 'identity', got {self.damping_scale!r}")
+        check_count("max_iterations", self.max_iterations, least=0)
+        check_count("patience", self.patience, least=1)
+        check_number("initial_damping", self.initial_damping, above=True, finite=True)
+        for name in ("gradient_tolerance", "step_tolerance", "merit_tolerance"):
+            check_number(name, getattr(self, name))
+        check_number("least_extrapolation", self.least_extrapolation, least=1.0)
+        check_number("accuracy", self.accuracy, above=True, most=1.0)
+        if self.time_limit is not None:
+            check_number("time_limit", self.time_limit)
+        if not isinstance(self.solver, str) and (
+            isinstance(self.solver, type) or not hasattr(self.solver, "factorise")
+        ):
+            raise SettingsError(
+                f"solver must be the name of a linear solver or an object such as ScipyDirect(), got {self.solver!r}"
+            )

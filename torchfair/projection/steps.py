@@ -13,7 +13,7 @@ from ..errors import SettingsError, SingularSystemError
 from .certificate import certified
 from .course import Course, Outcome, Standing, cannot_be_computed
 from .damping import Damping
-from .evaluate import check_start
+from .evaluate import check_linearised, check_start
 from .inequalities import Inequalities
 from .layout import State
 from .problem import Problem
@@ -43,7 +43,7 @@ def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = 
         SettingsError: settings ask for another linear solver than the problem was made for.
         TorchfairError: a residual or Jacobian is not finite at the start; names the term and its elements.
     """
-    settings = settings or ProjectionSettings()
+    settings = ProjectionSettings.given(settings)
     if problem.solved_by(settings.solver) is not problem:
         raise SettingsError(
             f"the problem was made for the linear solver '{problem.solver.name}', but settings ask for another one: "
@@ -53,6 +53,7 @@ def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = 
     evaluation = problem.structure.evaluate({name: block.detach().clone() for name, block in blocks.items()})
     check_start(problem.structure, evaluation)
     linearised, standings = _linearise(problem, evaluation, settings)
+    check_linearised(problem.structure, linearised.system)
     damping = Damping(settings.initial_damping)
     courses = [
         Course(

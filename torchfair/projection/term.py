@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
-from ..errors import ShapeError
+from ..errors import ShapeError, TorchfairError
+from .checks import check_data, check_term
+from .element_function import checked, mapped
 from .layout import Layout, State
 from .loss import Loss, Squares, apply_root, is_one_sided
 
@@ -29,25 +31,29 @@ class ElementTerm:
 
         ElementTerm("edge length", stretched, [("vertices", topology.edges)], data=(lengths,), weight=10.0)
 
+    Everything is in the dtype of the blocks and on their device. A solve is not differentiated through: data and
+    weights that require gradients are detached, silently.
+
     Attributes:
         name: Shown in the residual table; terms of one name are reported together.
         residual: The element function. It must be finite and differentiable where the solver goes; a value
             that is not finite rejects the step (this makes barriers possible).
-        stencil: ``(block name, (n, k) index tensor)`` pairs.
+        stencil: ``(block name, (n, k) index tensor)`` pairs; rows of the block, counted from 0.
         data: Tensors ``(n, ...)`` handed to the residual element by element, constant for derivatives.
         weight: Dimensionless weight of the term, at least 0.
-        element_weights: ``(n,)`` optional factors.
+        element_weights: ``(n,)`` optional factors, at least 0.
         loss: :class:`Squares`, :class:`SmoothAbsolute`, :class:`OneSided` for inequalities, or another :class:`Loss`.
         refresh: Called with every state that is evaluated; returns the ``data`` for that state (closest
-            points, frozen directions). The merit is therefore a function of the state alone.
+            points, frozen directions), a sequence. The merit is therefore a function of the state alone.
         merit: Element function with the same arguments that replaces the loss in the acceptance test, for
             reweighted targets whose residual is only a quadratic model; same gradient, never below zero.
         jacobian: Closed form of the derivative of the residual, ``(m, k_1 d_1 + k_2 d_2 + ...)`` or, for a
-            scalar residual, ``(k_1 d_1 + ...,)``; by default ``torch.func`` differentiates.
+            scalar residual, ``(k_1 d_1 + ...,)``; by default torch differentiates. At the first start it is compared
+            with that at a few elements, in float64 where the functions allow it; one that differs is an error.
         linear: The residual is affine in the state and has no refresh: differentiated only once.
         batched: :attr:`residual`, :attr:`merit` and :attr:`jacobian` take all n elements at once, ``(n, k, d)`` and
-            data ``(n, ...)``, and return results with n rows: faster where closed forms are written for it. Rows
-            must not depend on each other.
+            data ``(n, ...)``, and return results with n rows: faster where closed forms are written for it. They work
+            for any n; rows must not depend on each other.
     """
 
     name: str
@@ -70,38 +76,24 @@ class ElementTerm:
 
     def check(self, layout: Layout) -> None:
         """Raises ShapeError unless stencil, data and weights fit each other and the blocks."""
-        what = f"term '{self.name}'"
-        if not self.stencil:
-            raise ShapeError(what, "a stencil with at least one block", "none")
-        for name, index in self.stencil:
-            if name not in layout.sizes:
-                raise ShapeError(what, f"blocks among {list(layout.sizes)}", f"'{name}'")
-            rows = layout.sizes[name][0]
-            if index.ndim != 2 or index.is_floating_point() or index.shape[0] != self.num_elements:
-                raise ShapeError(
-                    f"{what}, stencil of '{name}'", f"indices ({self.num_elements}, k)", tuple(index.shape)
-                )
-            if index.numel() and (int(index.min()) < 0 or int(index.max()) >= rows):
-                raise ShapeError(f"{what}, stencil of '{name}'", f"indices in 0..{rows - 1}", "indices outside")
-        for tensor in (*self.data, *(() if self.element_weights is None else (self.element_weights,))):
-            if tensor.shape[:1] != (self.num_elements,):
-                raise ShapeError(f"{what}, data", f"({self.num_elements}, ...)", tuple(tensor.shape))
-        if not self.weight >= 0.0:
-            raise ShapeError(f"{what}, weight", "a number of at least 0", self.weight)
-        if self.linear and (self.refresh is not None or not isinstance(self.loss, Squares) or self.merit is not None):
-            raise ShapeError(what, "a linear term with squares and without refresh or merit", "one of these")
-        if self.merit is not None and is_one_sided(self.loss):
-            raise ShapeError(what, "inequalities without a merit of their own", "one")
+        check_term(self, layout)
 
     def arguments(self, state: State) -> tuple[Tensor, ...]:
         """Arguments of :attr:`residual` for all elements at once: ``(n, k, d)`` locals, then the data."""
         local = tuple(state[name][index] for name, index in self.stencil)
-        data = self.data if self.refresh is None else self.refresh(state)
-        return (*local, *data)
+        data = self.data
+        if self.refresh is not None:
+            data = self.refresh(state)
+            what = f"term '{self.name}', data that refresh returns"
+            check_data(what, data, self.num_elements, local[0].dtype, local[0].device)
+        return (*local, *(tensor.detach() for tensor in data))
 
     def roots(self, residuals: Tensor) -> Tensor:
         """Square roots (n,) or (n, m, m) of all weights of the quadratic model made at residuals ``(n, m)``."""
         root = self.loss.root(residuals)
+        n, m = residuals.shape
+        if root.shape not in ((n,), (n, m, m)):
+            raise ShapeError(f"term '{self.name}', root of its loss", f"({n},) or ({n}, {m}, {m})", tuple(root.shape))
         weights = torch.full_like(residuals[:, 0], self.weight)
         if self.element_weights is not None:
             weights = weights * self.element_weights
@@ -109,7 +101,7 @@ class ElementTerm:
 
     def values(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Residuals ``(n, m)``."""
-        return as_rows(self._mapped(self.residual)(*arguments))
+        return as_rows(mapped(self, "residual")(*arguments))
 
     def missed(self, residuals: Tensor) -> Tensor:
         """Residuals ``(n, m)`` without what holds of inequalities."""
@@ -117,29 +109,38 @@ class ElementTerm:
 
     def contributions(self, arguments: tuple[Tensor, ...], residuals: Tensor) -> Tensor:
         """(n,) merit of every element."""
-        own = self.loss.value(residuals) if self.merit is None else self._mapped(self.merit)(*arguments)
+        if self.merit is None:
+            own = self.loss.value(residuals)
+            if own.shape != residuals.shape[:1]:
+                raise ShapeError(f"term '{self.name}', value of its loss", f"({len(residuals)},)", tuple(own.shape))
+        else:
+            own = mapped(self, "merit")(*arguments)
         value = self.weight * own
         return value if self.element_weights is None else value * self.element_weights
 
     def derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
         """Residuals ``(n, m)`` and Jacobians ``(n, m, K)``, K unknowns of the stencil in order."""
-        if self.jacobian is not None:
-            return self.values(arguments), self.jacobians(arguments)
-        return differentiate(self.residual, arguments, len(self.stencil), batched=self.batched)
+        if self.jacobian is None:
+            return self.automatic_derivatives(arguments)
+        values, closed = self.values(arguments), self.jacobians(arguments)
+        if closed.shape[:2] != values.shape:
+            what = f"({values.shape[1]}, {closed.shape[2]}) as residual and unknowns"
+            raise ShapeError(f"term '{self.name}', jacobian of an element", what, tuple(closed.shape[1:]))
+        return values, closed
+
+    def automatic_derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
+        """The same by differentiating :attr:`residual`, also where there is a closed form."""
+        if torch.is_inference_mode_enabled():
+            raise TorchfairError(f"term '{self.name}' is differentiated, but not in inference mode: use torch.no_grad")
+        function, what = checked(self, "residual"), f"the residual of term '{self.name}'"
+        return differentiate(function, arguments, len(self.stencil), batched=self.batched, what=what)
 
     def jacobians(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Jacobians ``(n, m, K)``."""
         if self.jacobian is None:
-            return self.derivatives(arguments)[1]
-        closed = self._mapped(self.jacobian)(*arguments)
+            return self.automatic_derivatives(arguments)[1]
+        closed = mapped(self, "jacobian")(*arguments)
         return closed if closed.ndim == 3 else closed[:, None]
-
-    def _mapped(self, function: Residual) -> Residual:
-        """A function of all elements at once."""
-        if self.batched:
-            return function
-        mapped: Residual = torch.func.vmap(function)
-        return mapped
 
 
 def as_rows(values: Tensor) -> Tensor:
@@ -148,17 +149,30 @@ def as_rows(values: Tensor) -> Tensor:
 
 
 def differentiate(
-    residual: Residual, arguments: tuple[Tensor, ...], count: int, *, batched: bool = False
+    residual: Residual,
+    arguments: tuple[Tensor, ...],
+    count: int,
+    *,
+    batched: bool = False,
+    what: str = "the residual",
 ) -> tuple[Tensor, Tensor]:
     """Residuals ``(n, m)`` and Jacobians ``(n, m, K)`` with respect to the first ``count`` arguments.
 
     Elements do not depend on each other, so the gradient of the sum of one component over all elements
     holds that component's row of every element: reverse mode costs one sweep for each of the m components
     (and needs none of the machinery that ``jacrev`` imports, which takes seconds).
+
+    Raises:
+        TorchfairError: the residual does not depend on the first arguments; named ``what``.
     """
     local = [a.detach().requires_grad_() for a in arguments[:count]]
     with torch.enable_grad():
         values = as_rows((residual if batched else torch.func.vmap(residual))(*local, *arguments[count:]))
+        if values.numel() and not values.requires_grad:
+            raise TorchfairError(
+                f"{what} does not depend on its unknowns in a way that torch can differentiate: leave out "
+                "detach(), comparisons and rounding, or the term"
+            )
         totals = values.sum(0).unbind() if values.requires_grad else ()
     outputs, inputs = values.shape[1], sum(a[0].numel() for a in local) if values.shape[0] else 0
     if outputs > inputs > 0:

@@ -33,7 +33,9 @@ def reflection_variation_per_edge(
     """
     _check_form(form)
     edges = edge_vectors(vertices, topology)[..., : topology.num_interior_edges, :]
-    views = view_vectors("directions", axis_directions() if directions is None else directions, vertices)
+    if directions is None:
+        directions = axis_directions(torch.eye(3, dtype=vertices.dtype, device=vertices.device))
+    views = view_vectors("directions", directions, vertices)
     views = normalise(views, 0.0)  # a vector of length zero stays zero and sees nothing
     across = squared_cross(views, edges)
     if form == "sine":

@@ -54,8 +54,10 @@ def side_determinants(points: Tensor, noise: Tensor | float) -> tuple[Tensor, Te
     index = torch.arange(size, device=points.device)
     own = (index[:, None] == index) | ((index[:, None] + 1) % size == index)
     determinants = torch.where(own, 0.0, determinants)
-    noise = torch.as_tensor(noise, dtype=points.dtype, device=points.device)[..., None, None]
+    if isinstance(noise, Tensor):  # a number is not made a tensor, which would have to be copied to the device
+        noise = noise.to(points)[..., None, None]
     noise = noise + 8 * torch.finfo(points.dtype).eps
     lengths = torch.linalg.vector_norm(steps.detach(), dim=-1)[..., :, None]
     distances = torch.linalg.vector_norm(offsets.detach(), dim=-1)
-    return determinants, noise * (lengths + distances + noise)
+    # A point that moves changes the determinant by the distance of the two others, to first order.
+    return determinants, noise * (lengths + distances + distances.roll(-1, -2) + 4 * noise)

@@ -131,5 +131,6 @@ def _cross(points: Floats, noise: Floats, a: Ints, b: Ints, c: Ints, d: Ints) ->
 def _side(points: Floats, noise: Floats, a: Ints, b: Ints, c: Ints) -> npt.NDArray[np.int8]:
     step, offset = points[b] - points[a], points[c] - points[a]
     determinant = np.einsum("ij,ij->i", np.cross(points[a], step), offset)
-    doubt = noise * (np.linalg.norm(step, axis=1) + np.linalg.norm(offset, axis=1) + noise)
+    sides = sum(np.linalg.norm(side, axis=1) for side in (step, offset, points[c] - points[b]))
+    doubt = noise * (sides + 4 * noise)  # as in arcs.side_determinants
     return np.where(np.abs(determinant) > doubt, np.sign(determinant), 0).astype(np.int8)

@@ -1,0 +1,113 @@
+"""What the job that lowers E may do in a step."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from helpers import DOUBLE, grid_faces, split_quads
+from torch import Tensor
+
+from torchfair import MeshError, Topology
+from torchfair.energies import normal_variation
+from torchfair.formfinding import FairSettings, minimise_normal_variation
+from torchfair.formfinding.fair_problem import FairProblem
+
+
+def bent_sheet(n: int = 5) -> tuple[Tensor, Topology]:
+    """Part of a cylinder over a grid of unit edges; vertex 12 is the middle one, its neighbours 11, 13, 7, 17."""
+    x, y = torch.meshgrid(*(torch.arange(n, dtype=DOUBLE),) * 2, indexing="ij")
+    vertices = torch.stack([x, y, 0.1 * x**2], dim=-1).reshape(-1, 3)
+    return vertices, Topology.from_faces(split_quads(grid_faces(n, n)))
+
+
+def problem(
+    *, targets: dict[int, Tensor] | None = None, reference: bool = False, settings: FairSettings | None = None
+) -> FairProblem:
+    vertices, topology = bent_sheet()
+    own = (vertices, topology) if reference else None
+    return FairProblem(vertices, topology, own, targets or {}, settings or FairSettings())
+
+
+def moved(vertex: int, by: tuple[float, float, float]) -> dict[str, Tensor]:
+    vertices, _ = bent_sheet()
+    vertices[vertex] += torch.tensor(by, dtype=DOUBLE)
+    return {"vertices": vertices}
+
+
+def test_steps_above_the_energy_of_the_start_are_refused_from_every_state() -> None:
+    vertices, topology = bent_sheet()
+    flatter = {"vertices": vertices * torch.tensor([1.0, 1.0, 0.5], dtype=DOUBLE)}
+    bumpy = moved(12, (0.0, 0.0, 0.2))
+    start = {"vertices": vertices}
+    energy = {id(state): float(normal_variation(state["vertices"], topology)) for state in (start, flatter, bumpy)}
+    assert energy[id(flatter)] < energy[id(start)] < energy[id(bumpy)]
+    fair = problem()
+    assert fair.admits(start, flatter)
+    assert fair.admits(flatter, start)  # above the state before, not above the start
+    assert not fair.admits(start, bumpy)
+    assert not fair.admits(flatter, bumpy)
+
+
+def test_energy_may_rise_where_something_else_is_asked_for() -> None:
+    start, bumpy = moved(12, (0.0, 0.0, 0.0)), moved(12, (0.0, 0.0, 0.2))
+    assert problem(reference=True).admits(start, bumpy)
+    assert problem(targets={12: bumpy["vertices"][12]}).admits(start, bumpy)
+    assert not problem().admits(start, bumpy)
+
+
+def test_no_face_turns_over_whatever_is_asked_for() -> None:
+    """Beyond its neighbour a vertex turns the faces between over; the start is what faces are compared with."""
+    start, beyond, slightly = (moved(12, (0.0, y, 0.0)) for y in (0.0, 1.4, 0.4))
+    asked = problem(reference=True)
+    assert asked.admits(start, slightly)
+    assert not asked.admits(start, beyond)
+    assert not asked.admits(beyond, beyond)
+    design = problem(targets={12: beyond["vertices"][12] + torch.tensor([0.0, 0.0, 3.0], dtype=DOUBLE)})
+    assert design.design_mode
+    assert not design.admits(start, beyond)
+    assert design.admits(beyond, beyond)  # far from the start only the last state says what is front
+
+
+def test_one_handle_that_leaves_the_surface_is_enough_for_design_mode() -> None:
+    """The farthest target counts, measured from the reference surface and not from the vertex."""
+    vertices, _ = bent_sheet()
+    along, away = torch.tensor([0.0, 0.3, 0.0], dtype=DOUBLE), torch.tensor([0.0, 0.0, 0.7], dtype=DOUBLE)
+    on, off = {11: vertices[11] + along}, {13: vertices[13] + away}
+    assert not problem(targets=on).design_mode
+    assert problem(targets=off).design_mode
+    assert problem(targets={**on, **off}).design_mode
+    assert not problem(targets=off, settings=FairSettings(distance_limit=None)).design_mode
+    assert not problem(targets=off, settings=FairSettings(distance_limit=1.0)).design_mode
+
+
+def test_auxiliary_variables_fit_their_constraints_at_every_start_of_a_stage() -> None:
+    vertices, _ = bent_sheet()
+    fair = problem(settings=FairSettings(formulation="lifted"))
+    moved_on = vertices + 0.1 * torch.randn(vertices.shape, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
+    lifted = [term for term in fair.terms(1.0) if any(name != "vertices" for name, _ in term.stencil)]
+    for place in (vertices, moved_on):
+        blocks = fair.blocks(place)
+        assert torch.equal(blocks["vertices"], place)
+        for term in lifted[:-1]:  # the last one is E
+            assert float(term.values(term.arguments(blocks)).abs().max()) < 1e-12
+
+
+def test_a_single_face_without_area_is_refused() -> None:
+    vertices = torch.tensor([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0]], dtype=DOUBLE)
+    topology = Topology.from_faces([[0, 1, 2], [1, 0, 3]])
+    with pytest.raises(MeshError, match=r"1 face\(s\) have no area: faces \[1\]"):
+        minimise_normal_variation(vertices, topology)
+
+
+def test_energy_stays_at_most_that_of_the_start_even_where_fairness_would_raise_it() -> None:
+    """A cylinder with its rulings as edges has the least E there is; fairness of great weight bends them."""
+    u, z = torch.meshgrid(torch.linspace(0, 2, 9, dtype=DOUBLE), torch.arange(5, dtype=DOUBLE) / 4, indexing="ij")
+    u = u + 0.08 * torch.sin(9.0 * torch.arange(9, dtype=DOUBLE))[:, None]
+    vertices = torch.stack([u.cos(), u.sin(), z], dim=-1).reshape(-1, 3)
+    topology = Topology.from_faces(grid_faces(9, 5))
+    settings = FairSettings(
+        fairness_weight=1e3, closeness_weight=0.0, energy_weight=1e-6, distance_limit=None, planar="none"
+    )
+    result = minimise_normal_variation(vertices, topology, settings=settings)
+    assert result.after["normal_variation"] <= result.before["normal_variation"] * (1 + 1e-12)
+    assert any(not record.accepted for record in result.projection.history)  # it would have risen

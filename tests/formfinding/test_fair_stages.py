@@ -1,0 +1,78 @@
+"""Stages of the job that lowers E: handles are pulled in portions, planarity is raised until faces are planar."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+import torch
+from helpers import DOUBLE, grid_faces
+from torch import Tensor
+
+from torchfair import Topology
+from torchfair.formfinding import FairSettings, minimise_normal_variation
+from torchfair.formfinding.fair_problem import FairProblem
+from torchfair.geometry.planarity import planarity
+
+PLANAR = FairSettings(planar="quads")
+
+
+def quads(warp: float = 0.15, n: int = 5) -> tuple[Tensor, Topology]:
+    """Quads of a saddle z = warp (x^2 - y^2) over a bent grid; lengths are in mean edges, about 1."""
+    x, y = torch.meshgrid(*(torch.arange(n, dtype=DOUBLE) - n // 2,) * 2, indexing="ij")
+    x, y = x + 0.1 * torch.sin(2.0 * y), y + 0.1 * torch.sin(3.0 * x)
+    vertices = torch.stack([x, y, warp * (x**2 - y**2)], dim=-1).reshape(-1, 3)
+    return vertices, Topology.from_faces(grid_faces(n, n))
+
+
+def shares(settings: FairSettings, *, warp: float = 0.0, pull: float = 0.0) -> list[float]:
+    vertices, topology = quads(warp)
+    targets = {12: vertices[12] + torch.tensor([0.0, 0.0, pull], dtype=DOUBLE)} if pull else {}
+    return FairProblem(vertices, topology, None, targets, settings).shares()
+
+
+@pytest.mark.parametrize(("pull", "count"), [(0.3, 1), (0.5, 1), (0.51, 2), (1.2, 3), (9.9, 20), (30.0, 20)])
+def test_handles_are_pulled_by_half_a_mean_edge_at_a_time(pull: float, count: int) -> None:
+    assert shares(FairSettings(), pull=pull) == pytest.approx([(i + 1) / count for i in range(count)])
+
+
+def test_planarity_is_imposed_in_eight_stages_where_faces_are_warped() -> None:
+    vertices, topology = quads()
+    assert float(planarity(vertices, topology).max()) > 0.01
+    assert shares(PLANAR, warp=0.15) == pytest.approx([(i + 1) / 8 for i in range(8)])
+    assert shares(PLANAR, warp=0.15, pull=4.9) == pytest.approx([(i + 1) / 10 for i in range(10)])
+    vertices, topology = quads(0.02)
+    assert 0.0 < float(planarity(vertices, topology).max()) < 0.01
+    assert shares(PLANAR, warp=0.02) == [1.0]
+    assert shares(FairSettings(planar="none"), warp=0.15) == [1.0]
+
+
+def test_stages_mix_targets_evenly_and_weights_of_planarity_by_powers() -> None:
+    vertices, topology = quads()
+    target = vertices[12] + torch.tensor([0.0, 0.0, 2.0], dtype=DOUBLE)
+    for weight, share in itertools.product((0.0, 0.5, 1e3, 1e6), (0.25, 1.0, 7 / 6)):
+        settings = FairSettings(planar="quads", planarity_weight=weight)
+        terms = FairProblem(vertices, topology, None, {12: target}, settings).terms(share)
+        weights = [term.weight for term in terms if term.name == "planarity"]
+        assert weights in ([], [0.0]) if weight == 0.0 else weights == [pytest.approx(max(weight, 1.0) ** share)]
+        (handle,) = (term for term in terms if term.name == "handles")
+        missed = handle.values(handle.arguments({"vertices": vertices}))
+        assert float(missed.abs().max()) == pytest.approx(2.0 * min(share, 1.0))
+
+
+@pytest.mark.parametrize(("weight", "runs"), [(1e3, 10), (2.5e4, 9), (1e6, 8)])
+def test_planarity_is_raised_beyond_its_weight_until_faces_are_planar_at_most_twice(weight: float, runs: int) -> None:
+    """Each time by a sixth of its powers; what is planar enough is half of the deviation that the job promises."""
+    vertices, topology = quads()
+    settings = FairSettings(planar="quads", planarity_weight=weight)
+    result = minimise_normal_variation(vertices, topology, settings=settings)
+    done = [*result.preparation, result.projection]
+    assert len(done) == runs
+    felt = [next(row.weight for row in run.residuals if row.name == "planarity") for run in done]
+    expected = [*((i + 1) / 8 for i in range(8)), 7 / 6, 8 / 6][:runs]
+    assert felt == pytest.approx([weight**share for share in expected])
+    warps = [float(planarity(run.blocks["vertices"], topology).max()) for run in done[7:]]
+    assert all(warp > 5e-5 for warp in warps[:-1])
+    assert warps == sorted(warps, reverse=True)
+    assert warps[-1] <= 5e-5 or runs == 10
+    assert result.after["largest_planarity"] == pytest.approx(warps[-1], rel=1e-3)

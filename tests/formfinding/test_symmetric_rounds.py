@@ -1,0 +1,93 @@
+"""What changes from round to round while a principal-symmetric mesh is sought, and what is compiled once."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from helpers import DOUBLE
+
+from torchfair.formfinding import SymmetricDesign, SymmetricSettings
+from torchfair.formfinding.symmetric_problem import Aim
+from torchfair.formfinding.symmetric_rounds import SymmetricRounds
+from torchfair.principal import principal_edges_of_lattice
+from torchfair.shapes import Torus, principal_triangles
+
+
+def design(formulation: str = "spheres", handles: tuple[int, ...] = ()) -> SymmetricDesign:
+    mesh = principal_triangles(Torus(2.0, 1.0), 10, 14, along="u")
+    edges = principal_edges_of_lattice(mesh, "u")
+    return SymmetricDesign(mesh.vertices, edges, handles=handles, settings=SymmetricSettings(formulation=formulation))
+
+
+class Rounds(SymmetricRounds):
+    """Rounds that do nothing, and come out with the scores given."""
+
+    scores: list[tuple[float, int]]
+    seen: list[tuple[float, float]]
+
+    def _round(self, *, first: bool) -> bool:
+        self.seen.append((self.problem.pull, self.problem.sides.margin))
+        return False
+
+    def _score(self) -> tuple[float, int]:
+        return self.scores[len(self.seen) - 1]
+
+
+def rounds(scores: list[tuple[float, int]], pull: float) -> list[list[float]]:
+    """Pulls and margins of all rounds, with a handle that is ``pull`` mean edges away from its target."""
+    edited = design(handles=(3,))
+    edited.problem.targets = edited.problem.targets + torch.tensor([0.0, 0.0, pull], dtype=DOUBLE)
+    work = Rounds(edited.problem, edited.principal, edited._state, None)
+    work.scores, work.seen = scores, []
+    work.run(len(scores), settled=False)
+    return [list(column) for column in zip(*work.seen, strict=True)]
+
+
+MARGIN = SymmetricSettings().saddle_margin
+
+
+@pytest.mark.parametrize("pull", [0.2, 2.0])
+def test_handles_pull_less_and_less_where_conditions_cannot_be_met(pull: float) -> None:
+    pulls, margins = rounds([(1.0, 0)] * 4, pull)
+    assert pulls == pytest.approx([1.0, 0.2, 0.04, 0.008])
+    assert margins == [MARGIN] * 4
+
+
+def test_the_margin_of_saddle_sides_widens_where_no_handle_is_to_blame() -> None:
+    pulls, margins = rounds([(1.0, 0)] * 3, 0.05)
+    assert pulls == [1.0] * 3
+    assert margins == pytest.approx([MARGIN, 1.6 * MARGIN, 1.6**2 * MARGIN])
+
+
+def test_a_few_wrong_saddle_sides_widen_the_margin_and_many_make_handles_yield() -> None:
+    met = SymmetricSettings().tolerance
+    pulls, margins = rounds([(met, 1)] * 3, 2.0)
+    assert pulls == [1.0] * 3
+    assert margins == pytest.approx([MARGIN, 1.6 * MARGIN, 1.6**2 * MARGIN])
+    pulls, margins = rounds([(met, 50)] * 3, 2.0)  # in the first round they are given a wider margin all the same
+    assert pulls == pytest.approx([1.0, 1.0, 0.2])
+    assert margins == pytest.approx([MARGIN, 1.6 * MARGIN, 1.6 * MARGIN])
+
+
+def test_rounds_end_when_all_is_right() -> None:
+    met = SymmetricSettings().tolerance
+    assert len(rounds([(1.0, 0), (met, 0), (met, 0)], 2.0)[0]) == 2
+
+
+def test_problems_are_compiled_once_for_every_aim() -> None:
+    problem = design().problem
+    assert problem.compiled(Aim.SHAPE) is problem.compiled(Aim.SHAPE)
+    assert problem.compiled(Aim.SHAPE) is not problem.compiled(Aim.EXACT)
+
+
+def test_terms_of_the_papers_own_variables_follow_what_stars_are_to_be() -> None:
+    """Their slacks belong to saddles only, so that another decision makes another problem."""
+    problem = design("lifted").problem
+    counts = []
+    noise = torch.randn(problem.base.shape, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
+    for share in (0.0, 0.1):
+        problem.sides.decide(problem.base + share * noise)
+        (sides,) = (term for term in problem.compiled(Aim.SHAPE).terms if term.name == "saddle side")
+        assert sides.num_elements == int(problem.sides.is_saddle.sum())
+        counts.append(sides.num_elements)
+    assert counts[0] != counts[1]
