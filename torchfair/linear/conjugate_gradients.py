@@ -56,10 +56,8 @@ class ConjugateGradientFactor:
         iterations = 0
         while iterations < self._max_iterations:
             active = torch.linalg.vector_norm(remainder, dim=0) > target
-            if iterations % every == 0:
-                _refuse_if_sick(healthy)
-                if not bool(active.any()):
-                    break
+            if iterations % every == 0 and _is_done(active, healthy):
+                break
             image = self._system.product(direction).addcmul_(damping, direction)
             curvature = _dots(direction, image)
             healthy = healthy & ((curvature > 0.0) | ~active).all()
@@ -70,13 +68,20 @@ class ConjugateGradientFactor:
             previous, energy = energy, _dots(remainder, preconditioned)
             direction = preconditioned.addcmul_(torch.where(active, energy / previous, 0.0), direction)
             iterations += 1
-        _refuse_if_sick(healthy)
+        _is_done(healthy, healthy)
         return Solution(change, remainder, iterations)
 
 
-def _refuse_if_sick(healthy: Tensor) -> None:
-    if not bool(healthy):
+def _is_done(active: Tensor, healthy: Tensor) -> bool:
+    """Whether nothing is active any more; looks at one number.
+
+    Raises:
+        SingularSystemError: what was computed is not healthy.
+    """
+    state = int(torch.where(healthy, active.any().to(torch.int8), -1))
+    if state < 0:
         raise SingularSystemError("the matrix or its preconditioner is singular, indefinite or not finite")
+    return state == 0
 
 
 def _dots(left: Tensor, right: Tensor) -> Tensor:

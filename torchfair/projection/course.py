@@ -9,8 +9,6 @@ from .damping import Damping
 from .result import Status
 from .settings import ProjectionSettings
 
-_ROUNDING = 2.0**-51  # falls below this fraction of the merit cannot be computed
-
 
 @dataclass(frozen=True)
 class Standing:
@@ -153,8 +151,3 @@ class Course:
 def tightest_accuracy(settings: ProjectionSettings) -> float:
     """Relative remainder beyond which an iterative linear solver is not asked to go."""
     return max(0.1 * math.sqrt(settings.merit_tolerance), 1e-8)
-
-
-def cannot_be_computed(predicted: float, merit: float) -> bool:
-    """Whether a predicted fall of the merit is below its rounding errors."""
-    return predicted <= _ROUNDING * merit

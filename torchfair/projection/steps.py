@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ..errors import SettingsError, SingularSystemError
 from .certificate import certified
-from .course import Course, Outcome, Standing, cannot_be_computed
+from .course import Course, Outcome, Standing
 from .damping import Damping
 from .evaluate import check_linearised, check_start
 from .inequalities import Inequalities
@@ -116,13 +116,12 @@ def step(
     if best is not None:
         with watch.part("linearise"):
             linearised, standings = _linearise(problem, best, settings, state.linearised.stiffness)
+    outcomes = map(Outcome, dampings, trials.gains, *trials.sizes(), trials.taken)
     courses = tuple(
         course
         if course.finished(settings)
         else course.after(outcome, standing, settings, inexact=problem.solver.inexact)
-        for course, outcome, standing in zip(
-            state.courses, _outcomes(trials, proposal, dampings), standings, strict=True
-        )
+        for course, outcome, standing in zip(state.courses, outcomes, standings, strict=True)
     )
     evaluation = best or state.evaluation
     after = replace(state, evaluation=evaluation, linearised=linearised, courses=courses, heeded=proposal.heeded)
@@ -159,19 +158,14 @@ def _linearise(
 def _damping(problem: Problem, state: ProjectionState, dampings: Sequence[Damping]) -> Tensor:
     """(N,) the diagonal to be added; one where nothing is felt."""
     stiffness = state.linearised.stiffness
-    values = problem.layout.member_spread(stiffness.new_tensor([damping.value for damping in dampings]))
+    values = problem.layout.member_spread(_numbers([damping.value for damping in dampings], stiffness))
     scaled = values if state.settings.damping_scale == "identity" else values * stiffness
     return torch.where(stiffness > 0.0, scaled.clamp_min(torch.finfo(scaled.dtype).tiny), 1.0)
 
 
-def _outcomes(trials: Trials, proposal: Proposal, dampings: Sequence[Damping]) -> list[Outcome]:
-    layout = proposal.system.structure.layout
-    sizes = layout.member_largest(proposal.change.abs()).tolist()
-    promises = zip(proposal.predicted.tolist(), trials.before, strict=True)
-    short = [
-        step or cannot_be_computed(*promise) for step, promise in zip(trials.is_short(proposal), promises, strict=True)
-    ]
-    return list(map(Outcome, dampings, trials.gains, sizes, short, trials.taken))
+def _numbers(values: Sequence[float], like: Tensor) -> Tensor:
+    """(members,) numbers; a single one needs no copy to another device."""
+    return like.new_full((1,), values[0]) if len(values) == 1 else like.new_tensor(values)
 
 
 def _judged(problem: Problem, state: ProjectionState) -> ProjectionState:
@@ -218,7 +212,7 @@ def _try(trials: Trials, proposal: Proposal, state: ProjectionState) -> None:
     factors = [_extrapolation(gain) for gain in trials.gains]
     longer = [factor > settings.least_extrapolation for factor in factors]
     if any(longer):
-        spread = proposal.system.structure.layout.member_spread(change.new_tensor(factors))
+        spread = proposal.system.structure.layout.member_spread(_numbers(factors, change))
         trials.offer(spread * change, longer, again=True)
 
 

@@ -18,6 +18,7 @@ from .system import Evaluation
 Guard = Callable[[State, State], bool]
 
 LEAST_GAIN = 1e-4  # of the predicted fall of the merit, for a step to be taken
+_ROUNDING = 2.0**-51  # falls below this fraction of the merit cannot be computed
 _HALVINGS = 6  # of the step of unknowns whose elements leave their domain
 
 
@@ -34,7 +35,6 @@ class Trials:
         gains: For each member, by how much the merit falls at the best candidate so far, over what was promised;
             minus infinity while there is none.
         merits: Its merit.
-        before: Merits of the start.
     """
 
     def __init__(
@@ -49,7 +49,6 @@ class Trials:
         self._mixed = False
         self.merits = [course.merit for course in state.courses]
         self.gains = [-math.inf for _ in state.courses]
-        self.before = list(self.merits)
 
     def offer(self, change: Tensor, to: Sequence[bool] | None = None, *, again: bool = False) -> Evaluation | None:
         """Tries a step (N,); members for which it is the best so far take it.
@@ -62,10 +61,10 @@ class Trials:
         Returns:
             The state after the step, also where it is not taken; None if it is not finite.
         """
-        trial, change, promised = self._finite(change)
+        trial, change, merits, promised = self._finite(change)
         if trial is None:
             return None
-        merits, gains, takes = trial.merits.tolist(), [], []
+        gains, takes = [], []
         for number, course in enumerate(self._state.courses):
             asked = self._active[number] and (to is None or to[number])
             fall = course.merit - merits[number]
@@ -83,12 +82,18 @@ class Trials:
             self.merits = [new if take else old for take, new, old in zip(takes, merits, self.merits, strict=True)]
         return trial
 
-    def is_short(self, proposal: Proposal) -> list[bool]:
-        """For each member, whether a step is below ``step_tolerance``, in units of stiffness."""
-        weights, layout = self._state.linearised.stiffness, self._problem.layout
-        sizes = [layout.member_sums(weights * part.square()) for part in (proposal.change, self._start)]
-        short: list[bool] = (sizes[0] <= self._state.settings.step_tolerance**2 * sizes[1]).tolist()
-        return short
+    def sizes(self) -> tuple[list[float], list[bool]]:
+        """For each member, the largest change of an unknown, and whether the step promises nothing.
+
+        That is so where it is below ``step_tolerance``, in units of stiffness, or where the fall of the merit that it
+        promises is below rounding.
+        """
+        weights, layout, change = self._state.linearised.stiffness, self._problem.layout, self._proposal.change
+        squares = [layout.member_sums(weights * part.square()) for part in (change, self._start)]
+        short = squares[0] <= self._state.settings.step_tolerance**2 * squares[1]
+        tiny = self._proposal.predicted <= _ROUNDING * self._state.evaluation.merits
+        sizes, nothing = torch.stack([layout.member_largest(change.abs()), (short | tiny).to(change)]).tolist()
+        return sizes, [number > 0.0 for number in nothing]
 
     @property
     def taken(self) -> list[bool]:
@@ -99,21 +104,21 @@ class Trials:
         """The state in which every member has its best candidate; None if no member moves."""
         return self._evaluate(self._start + self._change) if self._mixed else self._best
 
-    def _finite(self, change: Tensor) -> tuple[Evaluation | None, Tensor, list[float]]:
-        """The state after a step, the step, and what the model promises for it.
+    def _finite(self, change: Tensor) -> tuple[Evaluation | None, Tensor, list[float], list[float]]:
+        """The state after a step, the step, merits, and by how much they should have fallen.
 
         Where single elements are not finite, at the border of their domain, the step of their unknowns is halved, so
         that they do not stop all others.
         """
-        structure, shortened = self._problem.structure, False
+        structure, fall = self._problem.structure, self._proposal.predicted
         for _ in range(_HALVINGS):
             trial = self._evaluate(self._start + change)
-            if bool(torch.isfinite(trial.merits).all()):
-                fall = self._proposal.system.predicted_fall(change) if shortened else self._proposal.predicted
-                return trial, change, fall.tolist()
-            spoilt = structure.unknowns_of_infinite_elements(trial)
-            change, shortened = torch.where(spoilt, 0.5 * change, change), True
-        return None, change, []
+            merits, promised = torch.stack([trial.merits, fall]).tolist()
+            if all(map(math.isfinite, merits)):
+                return trial, change, merits, promised
+            change = torch.where(structure.unknowns_of_infinite_elements(trial), 0.5 * change, change)
+            fall = self._proposal.system.predicted_fall(change)
+        return None, change, [], []
 
     def _admits(self, trial: State) -> bool:
         return self._guard is None or self._guard(self._state.evaluation.state, trial)
