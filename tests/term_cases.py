@@ -20,8 +20,7 @@ from torchfair.constraints.eliminated_principal_symmetric import eliminated_prin
 from torchfair.constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
 from torchfair.constraints.lifted_principal_symmetric import lifted_blocks as lifted_spheres
 from torchfair.constraints.lifted_principal_symmetric import lifted_principal_symmetric_terms
-from torchfair.geometry import corner_angles, face_areas, vertex_normals
-from torchfair.geometry.closest_curve_point import ReferenceCurves
+from torchfair.geometry import SplineCurves, corner_angles, face_areas, vertex_normals
 from torchfair.geometry.closest_point import ReferenceSurface
 from torchfair.principal import PrincipalStars, principal_edges_of_lattice
 from torchfair.projection import ElementTerm
@@ -127,7 +126,7 @@ def _(vertices: Tensor, topology: Topology) -> Terms:
 @case("closeness_terms", triangles, mixed)
 def _(vertices: Tensor, topology: Topology) -> Case:
     planes = TangentPlanes(ReferenceSurface(vertices, topology))
-    terms = c.closeness_terms(planes, topology.num_vertices, weight=0.5, device=vertices.device)
+    terms = c.closeness_terms(planes, torch.arange(1, len(vertices), device=vertices.device), weight=0.5)
     return {"vertices": moved(vertices)}, terms
 
 
@@ -156,10 +155,10 @@ def _(vertices: Tensor, topology: Topology) -> Case:
 @case("gliding_terms", triangles, mixed)
 def _(vertices: Tensor, topology: Topology) -> Case:
     pieces = boundary_pieces(topology, boundary_corners(vertices, topology, math.radians(40)))
-    curves = ReferenceCurves([vertices[piece.vertices] for piece in pieces], [piece.closed for piece in pieces])
+    curves = SplineCurves([vertices[piece.vertices] for piece in pieces], [piece.closed for piece in pieces])
     owners = torch.cat([torch.full_like(piece.vertices, number) for number, piece in enumerate(pieces)])
     gliding = torch.cat([piece.vertices for piece in pieces])
-    return {"vertices": moved(vertices)}, c.gliding_terms(curves, gliding, owners, weight=0.5)
+    return {"vertices": moved(vertices)}, c.gliding_terms(c.CurveFeet(curves, gliding, owners), weight=0.5)
 
 
 @case("handle_terms", triangles)

@@ -47,7 +47,7 @@ def test_terms_along_directions_equal_those_at_the_places() -> None:
 
 def test_refreshed_terms_cannot_go_along_directions() -> None:
     planes = TangentPlanes(ReferenceSurface(VERTICES, TOPOLOGY))
-    (term,) = closeness_terms(planes, TOPOLOGY.num_vertices, weight=1.0)
+    (term,) = closeness_terms(planes, torch.arange(TOPOLOGY.num_vertices), weight=1.0)
     with pytest.raises(ShapeError, match="no refresh"):
         along_directions(term, VERTICES, VERTICES)
 

@@ -11,8 +11,7 @@ from helpers import DOUBLE, wavy_grid
 from torchfair import constraints as c
 from torchfair.constraints.closeness import TangentPlanes
 from torchfair.constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
-from torchfair.geometry import face_areas
-from torchfair.geometry.closest_curve_point import ReferenceCurves
+from torchfair.geometry import SplineCurves, face_areas
 from torchfair.geometry.closest_point import ReferenceSurface
 from torchfair.principal import principal_edges_of_lattice
 from torchfair.projection import ElementTerm
@@ -27,7 +26,7 @@ UP = torch.tensor([0.0, 0.0, 1.0], dtype=DOUBLE)
 MESH = principal_triangles(Torus(2.0, 1.0), 12, 16)
 STARS = principal_edges_of_lattice(MESH).stars()
 PLANES = TangentPlanes(ReferenceSurface(VERTICES, TOPOLOGY), BLOCK)
-CURVE = ReferenceCurves([VERTICES[:4]], [False])
+FEET = c.CurveFeet(SplineCurves([VERTICES[:4]], [False]), RIM[:4], torch.zeros(4, dtype=torch.int64), block=BLOCK)
 COMMON = {"weight": WEIGHT, "block": BLOCK}
 
 
@@ -39,7 +38,7 @@ def every_edge() -> torch.Tensor:
 MAKERS: dict[str, Callable[[], Sequence[ElementTerm]]] = {
     "curvature": lambda: c.absolute_curvature_terms(TOPOLOGY, smoothing=0.1, **COMMON),
     "bending": lambda: c.boundary_bending_terms(TOPOLOGY, UP * torch.ones_like(VERTICES), smoothing=0.1, **COMMON),
-    "closeness": lambda: c.closeness_terms(PLANES, len(VERTICES), **COMMON),
+    "closeness": lambda: c.closeness_terms(PLANES, torch.arange(len(VERTICES)), **COMMON),
     "distance limit": lambda: c.distance_limit_terms(PLANES, torch.ones(len(VERTICES), dtype=DOUBLE), **COMMON),
     "angles": lambda: c.corner_angle_terms(TOPOLOGY, 0.1, torch.ones(len(TOPOLOGY.corners), dtype=DOUBLE), **COMMON),
     "areas": lambda: c.face_area_terms(TOPOLOGY, face_areas(VERTICES, TOPOLOGY), **COMMON),
@@ -51,7 +50,7 @@ MAKERS: dict[str, Callable[[], Sequence[ElementTerm]]] = {
     "fairness of quads": lambda: c.interior_fairness_terms(QUADS[1], **COMMON),
     "fairness of triangles": lambda: c.interior_fairness_terms(TOPOLOGY, **COMMON),
     "tangential fairness": lambda: c.tangential_fairness_terms(TOPOLOGY, **COMMON),
-    "gliding": lambda: c.gliding_terms(CURVE, RIM[:4], torch.zeros(4, dtype=torch.int64), **COMMON),
+    "gliding": lambda: c.gliding_terms(FEET, weight=WEIGHT),
     "handles": lambda: c.handle_terms(RIM[:4], VERTICES[RIM[:4]], **COMMON),
     "normal variation of triangles": lambda: c.normal_variation_terms(TOPOLOGY, smoothing=0.1, **COMMON),
     "normal variation of quads": lambda: c.normal_variation_terms(QUADS[1], smoothing=0.1, **COMMON),
