@@ -20,8 +20,9 @@ from torchfair.constraints.eliminated_principal_symmetric import eliminated_prin
 from torchfair.constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
 from torchfair.constraints.lifted_principal_symmetric import lifted_blocks as lifted_spheres
 from torchfair.constraints.lifted_principal_symmetric import lifted_principal_symmetric_terms
-from torchfair.geometry import SplineCurves, corner_angles, face_areas, vertex_normals
+from torchfair.geometry import corner_angles, face_areas, vertex_normals
 from torchfair.geometry.closest_point import ReferenceSurface
+from torchfair.geometry.spline_curves import SplineCurves
 from torchfair.principal import PrincipalStars, principal_edges_of_lattice
 from torchfair.projection import ElementTerm
 from torchfair.projection.layout import State
@@ -126,8 +127,8 @@ def _(vertices: Tensor, topology: Topology) -> Terms:
 @case("closeness_terms", triangles, mixed)
 def _(vertices: Tensor, topology: Topology) -> Case:
     planes = TangentPlanes(ReferenceSurface(vertices, topology))
-    terms = c.closeness_terms(planes, torch.arange(1, len(vertices), device=vertices.device), weight=0.5)
-    return {"vertices": moved(vertices)}, terms
+    chosen = torch.nonzero(topology.valences > 3).squeeze(1)
+    return {"vertices": moved(vertices)}, c.closeness_terms(planes, chosen, weight=0.5)
 
 
 @case("coplanar_terms", lattice)

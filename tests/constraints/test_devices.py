@@ -70,7 +70,7 @@ def test_closeness_waits_for_closest_points_once_for_each_state(device: torch.de
         pytest.skip("real devices do not tell")
     vertices, topology = triangles(device)
     planes = TangentPlanes(ReferenceSurface(vertices, topology))
-    terms = constraints.closeness_terms(planes, torch.arange(len(vertices), device=device), weight=1.0)
+    terms = constraints.closeness_terms(planes, torch.arange(topology.num_vertices, device=device), weight=1.0)
     terms += constraints.distance_limit_terms(planes, torch.ones_like(vertices[:, 0]), weight=1.0)
     for state in ({"vertices": vertices + shift} for shift in (0.1, 0.2)):
         with PretendedDevice() as there:
