@@ -191,17 +191,10 @@ class FairProblem:
         distances: Tensor = torch.linalg.vector_norm(vertices - positions, dim=1)
         return distances
 
-    def boundary_distances(self, vertices: Tensor) -> Tensor:
-        """(n,) distances of gliding vertices from their curves."""
-        feet = self.boundary.feet if self.boundary is not None else None
-        return vertices.new_zeros(0) if feet is None else feet({"vertices": vertices}).distances
-
     def _gliding_boundary(self) -> GlidingBoundary | None:
         if self.settings.boundary != "glide":
             return None
-        planar = torch.zeros_like(self.corners)
-        planar[self.topology.corners[torch.isin(self.topology.corner_faces, self.planar_faces)]] = True
-        return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles, planar)
+        return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles, self.planar_faces)
 
     def _boundary(self) -> list[ElementTerm]:
         if self.boundary is None:
