@@ -25,7 +25,7 @@ def problem(
 ) -> FairProblem:
     vertices, topology = bent_sheet()
     own = (vertices, topology) if reference else None
-    return FairProblem(vertices, topology, own, targets or {}, settings or FairSettings())
+    return FairProblem(vertices, topology, own, targets or {}, settings or FairSettings(boundary="free"))
 
 
 def moved(vertex: int, by: tuple[float, float, float]) -> dict[str, Tensor]:

@@ -191,17 +191,10 @@ class FairProblem:
         distances: Tensor = torch.linalg.vector_norm(vertices - positions, dim=1)
         return distances
 
-    def boundary_distances(self, vertices: Tensor) -> Tensor:
-        """(n,) distances of gliding vertices from their curves."""
-        feet = self.boundary.feet if self.boundary is not None else None
-        return vertices.new_zeros(0) if feet is None else feet({"vertices": vertices}).distances
-
     def _gliding_boundary(self) -> GlidingBoundary | None:
         if self.settings.boundary != "glide":
             return None
-        planar = torch.zeros_like(self.corners)
-        planar[self.topology.corners[torch.isin(self.topology.corner_faces, self.planar_faces)]] = True
-        return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles, planar)
+        return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles, self.planar_faces)
 
     def _boundary(self) -> list[ElementTerm]:
         if self.boundary is None:
@@ -240,17 +233,17 @@ class FairProblem:
 
         E may rise where handles, another reference or planarity ask for a different shape.
         """
-        guard = self._guard
-        kept = guard.keeps_faces(state, trial) and guard.keeps_bounds(trial)
-        return kept and (self._other_goals or guard.keeps_energy(trial))
+        kept = self._guard.keeps_faces(state, trial) and self._guard.keeps_bounds(trial)
+        return kept and (self._other_goals or self._guard.keeps_energy(trial))
 
     @cached_property
     def _guard(self) -> FairGuard:
+        bounded = self.settings.quality_weight > 0.0
         return FairGuard(
             self.vertices,
             self.topology,
             self.placed,
-            smallest_angle=self._smallest_angle,
-            smallest_area=self.settings.smallest_area,
+            smallest_angle=bounded * self._smallest_angle,
+            smallest_area=bounded * self.settings.smallest_area,
             from_last=self.design_mode,
         )

@@ -31,10 +31,11 @@ def fair_measures(
         ``smallest_area_ratio`` and ``flipped_faces`` against the start; ``largest_planarity`` of the faces kept planar
         (diagonal distance over mean edge of the face); ``largest_handle_distance``.
     """
-    distances = problem.distances(normalisation.apply(vertices))[topology.valences > 0]
+    normalised = normalisation.apply(vertices)
+    distances = problem.distances(normalised)[topology.valences > 0]
     ratios = face_areas(vertices, topology) / face_areas(start, topology)
     turned = (face_normals(vertices, topology) * face_normals(start, topology)).sum(1)
-    strayed = problem.boundary_distances(normalisation.apply(vertices))
+    strayed = vertices.new_zeros(0) if problem.boundary is None else problem.boundary.distances(normalised)
     planar = planarity(vertices, topology)[problem.planar_faces]
     pulled = normalisation.invert(problem.targets) - vertices[problem.handles]
     return {

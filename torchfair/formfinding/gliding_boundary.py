@@ -23,20 +23,23 @@ class GlidingBoundary:
         topology: Connectivity.
         corners: (V,) bool, boundary vertices at which curves end.
         handles: (n,) vertices that are pulled elsewhere.
-        loose: (V,) bool, vertices that the mesh of a state has where the state has them, for something else than the
-            curves holds them to a thousandth of an edge.
+        planar_faces: (n,) faces that are kept planar, which asks for more digits than that: in the mesh of a state
+            their vertices are where the state has them.
 
     Attributes:
         held: (V,) bool, vertices that glide and corners that stay: the curves hold them, not the surface.
         feet: Closest points of gliding vertices on their curves; None where nothing glides.
     """
 
-    def __init__(self, vertices: Tensor, topology: Topology, corners: Tensor, handles: Tensor, loose: Tensor) -> None:
+    def __init__(
+        self, vertices: Tensor, topology: Topology, corners: Tensor, handles: Tensor, planar_faces: Tensor
+    ) -> None:
         pieces = boundary_pieces(topology, corners)
         self.held = topology.is_boundary_vertex.clone()
         self.held[handles] = False
         chosen = torch.nonzero(self.held & ~corners).squeeze(1)
-        self._loose = loose[chosen, None]
+        loose = topology.corners[torch.isin(topology.corner_faces, planar_faces)]
+        self._loose = torch.isin(chosen, loose)[:, None]
         self.feet: CurveFeet | None = None
         if not chosen.numel():
             return
@@ -53,6 +56,10 @@ class GlidingBoundary:
         points, chosen = state[self.feet.block], self.feet.vertices
         places = torch.where(self._loose, points[chosen], self.feet(state).positions)
         return points.index_copy(0, chosen, places)
+
+    def distances(self, vertices: Tensor) -> Tensor:
+        """(n,) distances of gliding vertices from their curves, for vertices (V, 3) of a mesh."""
+        return vertices.new_zeros(0) if self.feet is None else self.feet({self.feet.block: vertices}).distances
 
     def nearest(self, state: State, positions: Tensor, normals: Tensor) -> tuple[Tensor, Tensor]:
         """Closest points (V, 3) and unit normals (V, 3) of a surface, or those of curves where they are nearer.
