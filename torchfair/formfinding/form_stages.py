@@ -17,7 +17,7 @@ Observe = Callable[[Tensor], dict[str, float]]
 Stage = tuple[Tensor, ProjectionResult]
 
 _TANGENT_ROUNDS = 3
-_ROUGHLY, _THOROUGHLY = 10.0, 0.1  # tolerances of stages along normals, over those in space
+_ROUGHLY, _THOROUGHLY = 5.0, 0.1  # tolerances of stages along normals, over those in space
 
 
 class FormStages:
@@ -72,8 +72,8 @@ class FormStages:
         yield from self._in_space(start, [] if self.problem.keeps_rows else last)
 
     def _is_doubtful(self, found: Sequence[Stage], start: Tensor) -> bool:
-        converged = all(run.status.converged for _, run in found)
-        return not converged or self.problem.has_collapsed(found[-1][0], start)
+        rests = all(run.status.at_rest for _, run in found)
+        return not rests or self.problem.has_collapsed(found[-1][0], start)
 
     def _is_better(self, surface: Tensor, other: Tensor, start: Tensor) -> bool:
         problem = self.problem
@@ -85,12 +85,14 @@ class FormStages:
 
     def _in_space(self, vertices: Tensor, smoothings: Sequence[float]) -> Iterator[Stage]:
         problem = self.problem
-        for fraction in smoothings:
+        for number, fraction in enumerate(smoothings):
             blocks = problem.blocks(vertices)
+            own = problem.settings.projection
+            settings = own if number == len(smoothings) - 1 else replace(own, when_settled="stop")
             terms = problem.terms(vertices, problem.smoothing(vertices, fraction))
             run = self._compiled(blocks, terms, {"vertices": problem.fixed_in_space}).solve(
                 blocks,
-                settings=problem.settings.projection,
+                settings=settings,
                 callback=self.callback,
                 observe=lambda state: self.observe(state["vertices"]),
                 guard=FaceGuard(problem.topology, lambda state: state["vertices"], problem.least_angle(vertices)),
@@ -130,8 +132,8 @@ class FormStages:
         settings = self.problem.settings
         own = settings.projection
         if fraction > settings.smoothing:
-            return replace(own, merit_tolerance=_ROUGHLY * own.merit_tolerance, patience=1)
-        return replace(own, merit_tolerance=_THOROUGHLY * own.merit_tolerance)
+            return replace(own, merit_tolerance=_ROUGHLY * own.merit_tolerance, patience=1, when_settled="stop")
+        return replace(own, merit_tolerance=_THOROUGHLY * own.merit_tolerance, when_settled="stop")
 
     def _one_along_normals(self, base: Tensor, fraction: float, fairness: float, correct: bool) -> Stage:
         problem = self.problem

@@ -88,4 +88,4 @@ class FairSettings:
     def stage(self) -> ProjectionSettings:
         """Settings of a stage before the last: fewer steps, wider tolerance."""
         most = min(20, self.projection.max_iterations)
-        return replace(self.projection, max_iterations=most, merit_tolerance=1e-2, patience=6)
+        return replace(self.projection, max_iterations=most, merit_tolerance=1e-2, patience=6, when_settled="stop")

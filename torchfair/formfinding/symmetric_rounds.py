@@ -20,7 +20,8 @@ _EXACT = ProjectionSettings(
     max_iterations=25,
     initial_damping=1e-4,
     damping_scale="identity",
-    merit_tolerance=1e-2,
+    merit_tolerance=3e-2,
+    when_settled="stop",
     step_tolerance=1e-12,
     least_extrapolation=math.inf,
 )

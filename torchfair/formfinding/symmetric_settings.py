@@ -15,7 +15,12 @@ FORMULATIONS = ("spheres", "eliminated", "lifted")
 
 def _default_projection() -> ProjectionSettings:
     return ProjectionSettings(
-        max_iterations=12, initial_damping=1e-3, damping_scale="identity", merit_tolerance=3e-2, patience=2
+        max_iterations=12,
+        initial_damping=1e-3,
+        damping_scale="identity",
+        merit_tolerance=6e-2,
+        patience=2,
+        when_settled="stop",
     )
 
 

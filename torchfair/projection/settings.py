@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from .._numbers import check_count, check_number
@@ -70,12 +71,15 @@ class ProjectionSettings:
     def __post_init__(self) -> None:
         if self.damping_scale not in ("diagonal", "identity"):
             raise SettingsError(f"damping_scale must be 'diagonal' or 'identity', got {self.damping_scale!r}")
+        if self.when_settled not in ("go on", "judge", "stop"):
+            raise SettingsError(f"when_settled must be 'go on', 'judge' or 'stop', got {self.when_settled!r}")
         check_count("max_iterations", self.max_iterations, least=0)
         check_count("patience", self.patience, least=1)
         check_number("initial_damping", self.initial_damping, above=True, finite=True)
         for name in ("gradient_tolerance", "step_tolerance", "merit_tolerance"):
             check_number(name, getattr(self, name))
         check_number("least_extrapolation", self.least_extrapolation, least=1.0)
+        check_number("least_uncorrected_gain", self.least_uncorrected_gain, least=-math.inf)
         check_number("accuracy", self.accuracy, above=True, most=1.0)
         if self.time_limit is not None:
             check_number("time_limit", self.time_limit)
