@@ -12,7 +12,9 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.formfinding import FairSettings, minimise_normal_variation
 from torchfair.formfinding.fair_problem import FairProblem
+from torchfair.formfinding.fair_stages import FairStages
 from torchfair.geometry.planarity import planarity
+from torchfair.shapes import Enneper, irregular_triangles
 
 PLANAR = FairSettings(planar="quads")
 
@@ -64,7 +66,7 @@ def test_stages_mix_targets_evenly_and_weights_of_planarity_by_powers() -> None:
 def test_planarity_is_raised_beyond_its_weight_until_faces_are_planar_at_most_twice(weight: float, runs: int) -> None:
     """Each time by a sixth of its powers; what is planar enough is half of the deviation that the job promises."""
     vertices, topology = quads()
-    settings = FairSettings(planar="quads", planarity_weight=weight)
+    settings = FairSettings(planar="quads", planarity_weight=weight, continuation=())
     result = minimise_normal_variation(vertices, topology, settings=settings)
     done = [*result.preparation, result.projection]
     assert len(done) == runs
@@ -76,3 +78,31 @@ def test_planarity_is_raised_beyond_its_weight_until_faces_are_planar_at_most_tw
     assert warps == sorted(warps, reverse=True)
     assert warps[-1] <= 5e-5 or runs == 10
     assert result.after["largest_planarity"] == pytest.approx(warps[-1], rel=1e-3)
+
+
+@pytest.mark.parametrize("continuation", [(), (10.0,), (100.0, 5.0)])
+def test_the_absolute_value_becomes_sharp_in_stages(continuation: tuple[float, ...]) -> None:
+    """Constraints are imposed with the bluntest one; results of the last stage are with the smoothing asked for."""
+    vertices, topology = quads()
+    settings = FairSettings(planar="quads", continuation=continuation, smoothing=0.02)
+    problem = FairProblem(vertices, topology, None, {}, settings)
+    stages = FairStages(problem, None, lambda state: {}).planned()
+    bluntest = max(continuation, default=1.0)
+    assert stages[:7] == [((i + 1) / 8, bluntest) for i in range(7)]
+    assert stages[7:] == [(1.0, factor) for factor in (*continuation, 1.0)]
+    for stage in stages:
+        terms = problem.terms(*stage)
+        losses = [term.loss.epsilon for term in terms if term.name == "normal variation"]
+        assert losses == [pytest.approx(0.02 * stage.blur)]
+
+
+def test_stages_find_a_lower_minimum_than_the_sharp_value_alone() -> None:
+    mesh = irregular_triangles(Enneper(), 150)
+    staged, alone = (
+        minimise_normal_variation(mesh.vertices, mesh.topology, settings=FairSettings(continuation=factors))
+        for factors in ((10.0, 3.0), ())
+    )
+    assert len(staged.preparation) == 2
+    assert not alone.preparation
+    assert staged.after["normal_variation"] < 1.001 * alone.after["normal_variation"]
+    assert staged.after["normal_variation"] < 0.98 * staged.before["normal_variation"]

@@ -13,7 +13,13 @@ from torch import Tensor
 from torchfair.projection import ElementTerm, ProjectionSettings, guided_projection
 from torchfair.projection.layout import State
 
-STEPS = ProjectionSettings(damping_scale="identity", solver="dense", merit_tolerance=0.0, gradient_tolerance=0.0)
+STEPS = ProjectionSettings(
+    damping_scale="identity",
+    solver="dense",
+    merit_tolerance=0.0,
+    gradient_tolerance=0.0,
+    least_uncorrected_gain=-math.inf,  # one trial for a step
+)
 
 
 def place(x: Tensor) -> Tensor:

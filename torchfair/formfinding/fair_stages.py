@@ -44,7 +44,7 @@ class FairStages:
 
     def __iter__(self) -> Iterator[ProjectionResult]:
         """The runs, until the last stage or until someone stops one of them."""
-        problem, stages = self._problem, self._planned()
+        problem, stages = self._problem, self.planned()
         while stages:
             stage = stages.pop(0)
             run = self._run(stage, last=not stages)
@@ -55,7 +55,8 @@ class FairStages:
             if not stages and stage.share < _LARGEST_SHARE and not problem.is_planar(problem.placed(run.blocks)):
                 stages.append(Stage(stage.share + _SHARE_STEP, 1.0))
 
-    def _planned(self) -> list[Stage]:
+    def planned(self) -> list[Stage]:
+        """All stages but those that raise planarity once more where the last one was not enough."""
         blurs = self._problem.settings.continuation if self._problem.settings.formulation == "reduced" else ()
         *first, last = self._problem.shares()
         bluntest = max(blurs, default=1.0)
