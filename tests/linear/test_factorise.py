@@ -12,7 +12,7 @@ from torch import Tensor
 
 from torchfair import ShapeError
 from torchfair.errors import SettingsError, SingularSystemError
-from torchfair.linear import ConjugateGradients, MatrixSystem, RslabDirect, factorise
+from torchfair.linear import BlockDense, ConjugateGradients, MatrixSystem, RslabDirect, factorise
 
 SOLVERS = ["dense", "scipy", "cg", "auto", *(["rslab"] if RslabDirect.available() else [])]
 
@@ -119,3 +119,21 @@ def test_an_own_solver_is_used() -> None:
     values: Tensor = factorise(grid_laplacian(), solver=solver).solve(right, 1e-10).values
     torch.testing.assert_close(torch.from_numpy(grid_laplacian().toarray()) @ values, right, atol=1e-8, rtol=0)
     assert solver.prepared == 1
+
+
+def test_blocks_are_solved_as_the_whole_matrix_is() -> None:
+    """Two blocks whose unknowns alternate, in another order in each."""
+    generator = torch.Generator().manual_seed(0)
+    unknowns = torch.tensor([[0, 2, 4, 6], [5, 1, 7, 3]])
+    matrix = torch.zeros(8, 8, dtype=torch.float64)
+    for rows in unknowns:
+        half = torch.randn(4, 4, dtype=torch.float64, generator=generator)
+        matrix[rows[:, None], rows] = half @ half.T
+    damping = torch.linspace(0.1, 0.8, 8, dtype=torch.float64)
+    right = torch.randn(8, 3, dtype=torch.float64, generator=generator)
+    factor = factorise(matrix, damping, solver=BlockDense(unknowns))
+    expected = torch.linalg.solve(matrix + torch.diag(damping), right)
+    torch.testing.assert_close(factor.solve(right).values, expected, atol=1e-10, rtol=0)
+    torch.testing.assert_close(factor.solve(right[:, 1]).values, expected[:, 1], atol=1e-10, rtol=0)
+    with pytest.raises(SingularSystemError, match="2 blocks of the matrix are not positive definite"):
+        factorise(matrix, -100.0 * damping, solver=BlockDense(unknowns))

@@ -5,6 +5,7 @@ from .base import LinearSolver as LinearSolver
 from .base import Pattern as Pattern
 from .base import Solution as Solution
 from .base import System as System
+from .block_dense import BlockDense as BlockDense
 from .choose import choose_solver as choose_solver
 from .conjugate_gradients import ConjugateGradients as ConjugateGradients
 from .dense import DenseQR as DenseQR

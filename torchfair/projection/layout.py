@@ -103,6 +103,10 @@ class Layout:
         parts = [values.repeat_interleave(n * d // self.members) for n, d in self.sizes.values()]
         return torch.cat(parts)
 
+    def member_unknowns(self) -> Tensor:
+        """(members, n) numbers of the unknowns of each member."""
+        return torch.cat(self._by_member(torch.arange(self.num_unknowns, device=self.device)), dim=1)
+
     def chosen_members(self, flat: Tensor, chosen: list[int]) -> Tensor:
         """The flat vector of some of the members alone."""
         return torch.cat([part[chosen].reshape(-1) for part in self._by_member(flat)])

@@ -11,12 +11,14 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError
-from ..linear import DenseQR, LinearSolver, choose_solver
+from ..linear import BlockDense, LinearSolver, choose_solver
 from .checks import listed
 from .layout import Layout, State
 from .replicate import replicated
 from .system import Structure
 from .term import ElementTerm
+
+_SMALL = 250  # unknowns of a member for which dense factors are the fastest
 
 _Problem = TypeVar("_Problem", bound="Problem")
 
@@ -85,10 +87,17 @@ class Problem:
         return result
 
     def batched(self, count: int) -> Problem:
-        """The problems of ``count`` members with the same terms as one, see :class:`Layout`.
+        """The problems of ``count`` members with the same terms as one, see :class:`Layout`; kept for the next time.
 
-        A dense solver, which is for few unknowns, is replaced by one that suits all members together.
+        Small members have a dense solver of their own each, unless this problem has an iterative one; larger ones have
+        the same solver for all together.
         """
+        known = self._others.get(count)
+        if known is None:
+            known = self._others[count] = self._made_for(count)
+        return known
+
+    def _made_for(self, count: int) -> Problem:
         result = copy.copy(self)
         result._others = {}
         sizes = {name: (count * n, d) for name, (n, d) in self.layout.sizes.items()}
@@ -97,8 +106,8 @@ class Problem:
         parts = self.layout.unflatten(self.structure.free)
         free = torch.cat([part.repeat(count, 1).flatten() for part in parts.values()])
         result.structure = Structure(result.layout, result.terms, free, self.layout.dtype)
-        dense = isinstance(self.solver, DenseQR)
-        result.solver = choose_solver("auto", result.structure) if dense else copy.copy(self.solver)
+        small = self.layout.num_unknowns <= _SMALL and not self.solver.inexact
+        result.solver = BlockDense(result.layout.member_unknowns()) if small else copy.copy(self.solver)
         return result
 
     def check_blocks(self, blocks: State) -> None:
