@@ -25,8 +25,8 @@ from torchfair.curves import ClosedCurve
 from torchfair.energies import normal_variation, total_absolute_curvature
 from torchfair.formfinding import FormResult, minimise_absolute_curvature
 from torchfair.geometry import corner_angles, face_areas, shape_operators, vertex_areas
-from torchfair.projection import ElementTerm, ProjectionSettings, SmoothAbsolute, guided_projection
 from torchfair.normalisation import Normalisation
+from torchfair.projection import ElementTerm, ProjectionSettings, SmoothAbsolute, guided_projection
 from torchfair.subdivision import loop
 
 Mesh = tuple[Tensor, Topology]
