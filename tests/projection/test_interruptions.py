@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
-import signal
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 import torch
 from helpers import DOUBLE, wavy_grid
+from interruptions import WAYS, nth, press, stop
 from torch import Tensor
 
 from torchfair.projection import ElementTerm, GuidedProjection, IterationRecord, ProjectionResult, Status, run
@@ -25,30 +23,6 @@ def problem() -> tuple[GuidedProjection, dict[str, Tensor]]:
     return GuidedProjection({"x": vertices}, [ElementTerm("length", stretched, [("x", topology.edges)])]), {
         "x": vertices
     }
-
-
-def nth(function: Callable[..., Any], n: int, act: Callable[[], None], *, after: bool = False) -> Callable[..., Any]:
-    """The function, with ``act()`` before or after its n-th call."""
-    calls = []
-
-    def wrapped(*arguments: Any, **named: Any) -> Any:
-        calls.append(1)
-        if len(calls) == n and not after:
-            act()
-        value = function(*arguments, **named)
-        if len(calls) == n and after:
-            act()
-        return value
-
-    return wrapped
-
-
-def stop() -> None:
-    raise KeyboardInterrupt
-
-
-def press() -> None:
-    os.kill(os.getpid(), signal.SIGINT)
 
 
 def length(x: Tensor, edges: Tensor) -> float:
@@ -67,7 +41,7 @@ def check(result: ProjectionResult, start: Tensor, edges: Tensor) -> None:
     assert [record.iteration for record in result.history] == list(range(len(result.history)))
 
 
-@pytest.mark.parametrize("act", [stop, press])
+@WAYS
 @pytest.mark.parametrize("after", [False, True])
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("phase", ["init", "step"])
@@ -85,7 +59,7 @@ def test_interrupted_in_a_phase_state_and_history_are_of_one_step(
     check(result, blocks["x"], solver.terms[0].stencil[0][1])
 
 
-@pytest.mark.parametrize("act", [stop, press])
+@WAYS
 def test_interrupted_while_observing_the_step_is_kept(act: Callable[[], None]) -> None:
     solver, blocks = problem()
     observe = nth(lambda state: {"first": float(state["x"][0, 0])}, 3, act)
@@ -98,7 +72,7 @@ def test_interrupted_while_observing_the_step_is_kept(act: Callable[[], None]) -
     check(result, blocks["x"], solver.terms[0].stencil[0][1])
 
 
-@pytest.mark.parametrize("act", [stop, press])
+@WAYS
 def test_interrupted_at_the_end_the_tables_are_made_and_the_status_stays(
     monkeypatch: pytest.MonkeyPatch, act: Callable[[], None]
 ) -> None:
@@ -136,7 +110,7 @@ def test_the_start_that_comes_back_is_not_the_tensor_that_was_given(monkeypatch:
     assert result.blocks["x"].data_ptr() != blocks["x"].data_ptr()
 
 
-@pytest.mark.parametrize("act", [stop, press])
+@WAYS
 def test_a_batch_interrupted_at_its_start_gives_every_member_its_own(
     monkeypatch: pytest.MonkeyPatch, act: Callable[[], None]
 ) -> None:
