@@ -111,6 +111,24 @@ def test_work_that_is_insisted_on_is_done_once_more_and_the_interrupt_waits() ->
         assert len(calls) == 2
 
 
+def test_work_that_can_be_left_is_left_when_interrupted_in_it_or_before() -> None:
+    calls: list[int] = []
+
+    def work(interrupted: bool) -> int:
+        calls.append(1)
+        if interrupted:
+            raise KeyboardInterrupt
+        return 7
+
+    with deferred_interrupts() as interrupts:
+        assert interrupts.attempt(work, False) == 7
+        assert interrupts.attempt(work, True) is None
+        press()
+        assert interrupts.attempt(work, False) is None
+        assert len(calls) == 2
+        assert not interrupts.pending
+
+
 @pytest.mark.parametrize(("at", "expected"), [(0, [0, 1, 2]), (2, [0, 1]), (9, [0, 1, 2])])
 def test_what_was_collected_is_kept_and_at_least_one(at: int, expected: list[int]) -> None:
     raised = []

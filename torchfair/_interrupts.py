@@ -53,6 +53,14 @@ class Interrupts:
             self.pending = True
         return work(*arguments)
 
+    def attempt(self, work: Callable[..., _T | None], *arguments: object) -> _T | None:
+        """The value of ``work(*arguments)``, which one can do without: None if interrupted, also before."""
+        try:
+            self.check()
+            return work(*arguments)
+        except KeyboardInterrupt:
+            return None
+
     def collect(self, begin: Callable[[], Iterable[_T]]) -> tuple[list[_T], bool]:
         """What ``begin()`` hands on, at least one, until interrupted; and whether it was.
 

@@ -13,8 +13,17 @@ from interruptions import WAYS, nth
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.formfinding import FairSettings, minimise_normal_variation
-from torchfair.projection import Status
+from torchfair.formfinding import (
+    FairSettings,
+    SymmetricDesign,
+    SymmetricResult,
+    SymmetricSettings,
+    minimise_normal_variation,
+    principal_symmetric,
+)
+from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
+from torchfair.projection import IterationRecord, Status
+from torchfair.shapes import Torus, principal_triangles
 
 Act = Callable[[], None]
 
@@ -77,3 +86,122 @@ def test_lowering_e_keeps_the_stages_done(phase: str, act: Act, monkeypatch: pyt
     assert result.before == whole.before
     assert result.after["normal_variation"] <= result.before["normal_variation"] * (1.0 + 1e-12)
     assert result.projection.residuals[0].elements > 0
+
+
+def torus() -> tuple[Tensor, PrincipalEdges, dict[int, list[float]]]:
+    """A principal-symmetric mesh that is not quite one, with a handle far enough to be pulled in portions."""
+    mesh = principal_triangles(Torus(2.0, 1.0), 10, 14, along="u")
+    edges = principal_edges_of_lattice(mesh, "u").check()
+    vertices = mesh.vertices + 0.02 * torch.sin(7.0 * mesh.vertices.roll(1, 1))
+    return vertices, edges, {3: (1.9 * vertices[3]).tolist()}
+
+
+def contents(design: SymmetricDesign) -> dict[str, object]:
+    """Everything that an edit may change."""
+    problem = design.problem
+    state = {"vertices": design.vertices, "targets": design.targets, **design._state, **vars(problem.sides)}
+    copies = {name: value.clone() if isinstance(value, Tensor) else value for name, value in state.items()}
+    return {**copies, "pull": problem.pull, "runs": len(design.runs)}
+
+
+def assert_equal(found: dict[str, object], expected: dict[str, object]) -> None:
+    assert found.keys() == expected.keys()
+    for name, value in found.items():
+        other = expected[name]
+        if isinstance(value, Tensor) and isinstance(other, Tensor):
+            assert torch.equal(value, other), name
+        elif isinstance(value, tuple) and isinstance(other, tuple):
+            assert all(torch.equal(*pair) for pair in zip(value, other, strict=True)), name
+        else:
+            assert value == other, name
+
+
+def edited() -> SymmetricDesign:
+    """A design after its first edit, of a handle that is moved a little."""
+    vertices, edges, handles = torus()
+    design = SymmetricDesign(vertices, edges, handles=list(handles), settings=SymmetricSettings(rounds=1))
+    design.move({3: (1.1 * vertices[3]).tolist()})
+    return design
+
+
+@pytest.fixture(scope="module")
+def undisturbed() -> tuple[dict[str, object], dict[str, object]]:
+    """What is in a design before and after its second edit."""
+    design = edited()
+    before = contents(design)
+    design.move(torus()[2])
+    return before, contents(design)
+
+
+@pytest.mark.parametrize("at", [0, 1, 8, 18])
+def test_a_callback_that_raises_leaves_a_design_as_it_was(
+    at: int, undisturbed: tuple[dict[str, object], dict[str, object]]
+) -> None:
+    """Bit for bit, also in the next edit."""
+    design, handles, records = edited(), torus()[2], []
+
+    def fail(record: IterationRecord) -> None:
+        records.append(record)
+        if len(records) == at + 1:
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        design.move(handles, fail)
+    assert_equal(contents(design), undisturbed[0])
+    design.move(handles)
+    assert_equal(contents(design), undisturbed[1])
+
+
+SYMMETRIC = SymmetricSettings(rounds=2, most_steps=30)
+SYMMETRIC_PHASES = {
+    "handles": ("principal_symmetric:read_handles", 1, 0),
+    "measuring the start": ("symmetric_design:symmetric_measures", 1, 0),
+    "snapshot": ("symmetric_problem:SymmetricProblem.snapshot", 1, 0),
+    "first decision": ("symmetric_rounds:SymmetricRounds._decide", 1, 0),
+    "first compiled": ("symmetric_problem:GuidedProjection", 1, 0),
+    "second compiled": ("symmetric_problem:GuidedProjection", 2, 1),
+    "second decision": ("symmetric_rounds:SymmetricRounds._decide", 2, 1),
+    "score": ("symmetric_rounds:SymmetricRounds._score", 1, 1),
+    "measuring the result": ("symmetric_design:symmetric_measures", 2, 1),
+    "normals": ("symmetric_design:strip_normals", 1, 1),
+    "refinement": ("symmetric_design:loop", 1, 1),
+    "finer problem": ("symmetric_design:SymmetricProblem", 2, 1),
+    "measuring the finer start": ("symmetric_design:symmetric_measures", 3, 1),
+    "finer snapshot": ("symmetric_problem:SymmetricProblem.snapshot", 2, 1),
+    "measuring the finer result": ("symmetric_design:symmetric_measures", 4, 2),
+}
+
+
+@pytest.fixture(scope="module")
+def whole() -> SymmetricResult:
+    """Of the design below, undisturbed."""
+    vertices, edges, handles = torus()
+    return principal_symmetric(vertices, edges, handles=handles, levels=1, settings=SYMMETRIC)
+
+
+@WAYS
+@pytest.mark.parametrize("phase", SYMMETRIC_PHASES)
+def test_a_design_keeps_the_levels_done(
+    phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, whole: SymmetricResult
+) -> None:
+    vertices, edges, handles = torus()
+    place, n, done = SYMMETRIC_PHASES[phase]
+    disturb(monkeypatch, place, n, act)
+    result = principal_symmetric(vertices, edges, handles=handles, levels=1, settings=SYMMETRIC)
+    assert len(result.levels) == max(done, 1)
+    if done == 2:  # it came too late to stop anything
+        assert not result.stopped
+        assert torch.equal(result.vertices, whole.vertices)
+        return
+    assert result.stopped
+    assert result.projection.status is Status.INTERRUPTED
+    (level,) = result.levels
+    if not done:
+        torch.testing.assert_close(result.vertices, vertices, atol=1e-12, rtol=0)
+        assert level.steps == 0
+    assert result.before == whole.before
+    (target,) = (torch.tensor(place, dtype=DOUBLE) for place in handles.values())
+    away, at_first = (float((x[3] - target).norm()) for x in (result.vertices, vertices))
+    assert away < at_first if done else away == pytest.approx(at_first)
+    if phase not in ("second compiled", "second decision", "score"):  # the level was finished
+        assert not done or torch.equal(result.vertices, whole.levels[0].vertices)
