@@ -15,15 +15,19 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.formfinding import (
     FairSettings,
+    FormResult,
+    FormSettings,
     SymmetricDesign,
     SymmetricResult,
     SymmetricSettings,
+    form_stages,
+    minimise_absolute_curvature,
     minimise_normal_variation,
     principal_symmetric,
 )
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.projection import IterationRecord, Status
-from torchfair.shapes import Torus, principal_triangles
+from torchfair.shapes import Cylinder, Torus, principal_triangles
 
 Act = Callable[[], None]
 
@@ -86,6 +90,91 @@ def test_lowering_e_keeps_the_stages_done(phase: str, act: Act, monkeypatch: pyt
     assert result.before == whole.before
     assert result.after["normal_variation"] <= result.before["normal_variation"] * (1.0 + 1e-12)
     assert result.projection.residuals[0].elements > 0
+
+
+def barrel() -> tuple[Tensor, Topology]:
+    """A cylinder, bulged; the surface of least C is the cylinder."""
+    mesh = principal_triangles(Cylinder(1.0, 2.0), 5, 12)
+    x, y, z = mesh.vertices.unbind(1)
+    t = (z - z.min()) / (z.max() - z.min())
+    bulge = 1.0 + t * (1.0 - t)
+    return torch.stack([x * bulge, y * bulge, z], 1), mesh.topology
+
+
+FORM = replace(FormSettings(), boundary="glide", projection=replace(FormSettings().projection, max_iterations=3))
+FORM_PHASES = {  # function, call, stages of the coarse level that are done (-1: all), whether the fine level is
+    "start": ("absolute_curvature:one_start", 1, 0, False),
+    "measuring the start": ("absolute_curvature:form_measures", 1, 0, False),
+    "problem": ("form_level:FormProblem", 1, 0, False),
+    "directions": ("form_problem:FormProblem.directions", 1, 0, False),
+    "first compiled": ("form_stages:GuidedProjection", 1, 0, False),
+    "doubt": ("form_stages:FormStages._is_doubtful", 1, 1, False),
+    "second compiled": ("form_stages:GuidedProjection", 2, 1, False),
+    "third compiled": ("form_stages:GuidedProjection.with_terms", 1, 2, False),
+    "end of the level": ("form_level:FormLevel.moved", 1, -1, False),
+    "refinement": ("form_level:loop", 1, -1, False),
+    "finer problem": ("form_level:FormProblem", 2, -1, False),
+    "finer compiled": ("form_stages:GuidedProjection", 3, -1, False),
+    "measuring the result": ("absolute_curvature:form_measures", 2, -1, True),
+}
+
+
+@pytest.fixture(scope="module")
+def surfaces() -> list[FormResult]:
+    """Of the barrel, undisturbed, without and with refinement."""
+    return [minimise_absolute_curvature(*barrel(), levels=levels, settings=FORM) for levels in (0, 1)]
+
+
+@WAYS
+@pytest.mark.parametrize("phase", FORM_PHASES)
+def test_lowering_c_keeps_the_stages_and_levels_done(
+    phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, surfaces: list[FormResult]
+) -> None:
+    place, n, stages, fine = FORM_PHASES[phase]
+    disturb(monkeypatch, place, n, act)
+    vertices, topology = barrel()
+    result = minimise_absolute_curvature(vertices, topology, levels=1, settings=FORM)
+    assert result.before == surfaces[0].before
+    if fine:  # it came too late to stop anything
+        assert torch.equal(result.vertices, surfaces[1].vertices)
+        assert (result.after, result.message) == (surfaces[1].after, surfaces[1].message)
+        return
+    assert result.projection.status is Status.INTERRUPTED
+    assert result.topology.num_vertices == topology.num_vertices
+    done = [run for run in result.stages if run.iterations]
+    assert len(done) == (len(surfaces[0].stages) if stages < 0 else stages)
+    assert result.levels == [0] * len(result.stages)
+    if stages < 0:
+        assert torch.equal(result.vertices, surfaces[0].vertices)
+        assert result.after == surfaces[0].after
+    elif stages == 0:
+        torch.testing.assert_close(result.vertices, vertices, atol=1e-12, rtol=0)
+    else:
+        assert result.after["total_absolute_curvature"] < result.before["total_absolute_curvature"]
+
+
+@pytest.mark.parametrize("at", [0, 1])
+def test_a_second_start_that_is_interrupted_does_not_replace_the_better_surface(
+    at: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the coarse smoothings are in doubt, the last one is tried from the start."""
+    vertices, topology = barrel()
+    monkeypatch.setattr(form_stages.FormStages, "_is_doubtful", lambda *_: True)
+    undisturbed = minimise_absolute_curvature(vertices, topology, settings=FORM)
+    second = len(FORM.smoothings()) - 1  # stages with coarser smoothings
+    starts: list[int] = []
+
+    def stop_in_the_second(record: IterationRecord) -> None:
+        starts.extend([1] * (record.iteration == 0))
+        if len(starts) == second + 1 and record.iteration == at:
+            raise KeyboardInterrupt
+
+    result = minimise_absolute_curvature(vertices, topology, settings=FORM, callback=stop_in_the_second)
+    assert len(result.stages) == second + 1
+    assert result.projection.status is Status.INTERRUPTED
+    assert len(undisturbed.stages) > second + 1
+    found = result.after["total_absolute_curvature"]
+    assert found < 0.9 * result.before["total_absolute_curvature"]
 
 
 def torus() -> tuple[Tensor, PrincipalEdges, dict[int, list[float]]]:
