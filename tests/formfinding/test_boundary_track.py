@@ -11,8 +11,7 @@ from helpers import DOUBLE
 from torch import Tensor
 
 from torchfair.curves import ClosedCurve
-from torchfair.formfinding import FormSettings, minimise_absolute_curvature, start_surface
-from torchfair.formfinding import form_level
+from torchfair.formfinding import FormSettings, form_level, minimise_absolute_curvature, start_surface
 from torchfair.formfinding.boundary_track import BoundaryTrack
 from torchfair.projection import ProjectionSettings
 from torchfair.subdivision import loop
