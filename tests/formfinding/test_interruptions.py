@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import pytest
 import torch
 from helpers import DOUBLE, grid_faces
-from interruptions import WAYS, nth
+from interruptions import WAYS, nth, stop
 from torch import Tensor
 
 from torchfair import Topology
@@ -30,6 +32,13 @@ from torchfair.projection import IterationRecord, Status
 from torchfair.shapes import Cylinder, Torus, principal_triangles
 
 Act = Callable[[], None]
+
+
+@pytest.fixture(autouse=True)
+def handler_is_put_back() -> Iterator[None]:
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def disturb(monkeypatch: pytest.MonkeyPatch, place: str, n: int, act: Act) -> None:
@@ -90,6 +99,18 @@ def test_lowering_e_keeps_the_stages_done(phase: str, act: Act, monkeypatch: pyt
     assert result.before == whole.before
     assert result.after["normal_variation"] <= result.before["normal_variation"] * (1.0 + 1e-12)
     assert result.projection.residuals[0].elements > 0
+
+
+def test_in_another_thread_interrupts_that_are_raised_keep_the_stages_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    place, n, stages = FAIR_PHASES["third compiled"]
+    disturb(monkeypatch, place, n, stop)
+    results = []
+    thread = threading.Thread(target=lambda: results.append(minimise_normal_variation(*quads(), settings=FAIR)))
+    thread.start()
+    thread.join()
+    (result,) = results
+    assert result.projection.status is Status.INTERRUPTED
+    assert sum(run.iterations > 0 for run in [*result.preparation, result.projection]) == stages
 
 
 def barrel() -> tuple[Tensor, Topology]:
@@ -292,5 +313,6 @@ def test_a_design_keeps_the_levels_done(
     (target,) = (torch.tensor(place, dtype=DOUBLE) for place in handles.values())
     away, at_first = (float((x[3] - target).norm()) for x in (result.vertices, vertices))
     assert away < at_first if done else away == pytest.approx(at_first)
+    assert level.after["largest_handle_distance"] == pytest.approx(away)  # from the target asked for, not a portion
     if phase not in ("second compiled", "second decision", "score"):  # the level was finished
         assert not done or torch.equal(result.vertices, whole.levels[0].vertices)
