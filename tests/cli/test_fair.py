@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 from helpers import wavy_grid
+from interruptions import nth, press
 
 from torchfair.cli import main
 from torchfair.energies import normal_variation
@@ -132,6 +133,40 @@ def test_interruption_writes_the_best_mesh(
     assert report["status"] == "interrupted"
     assert report["energies"]["after"]["normal_variation"] < report["energies"]["before"]["normal_variation"]
     assert load_mesh(output).topology.num_faces == load_mesh(roof).topology.num_faces
+
+
+@pytest.mark.parametrize("place", ["FairProblem.shares", "FairProblem.terms", "fair_measures"])
+def test_ctrl_c_while_setting_up_or_measuring_writes_everything(
+    place: str, roof: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from torchfair.formfinding import fair_problem
+    from torchfair.formfinding import normal_variation as job
+
+    owner: object = job if place == "fair_measures" else fair_problem.FairProblem
+    name = place.split(".")[-1]
+    monkeypatch.setattr(owner, name, nth(getattr(owner, name), 1, press))
+    output = tmp_path / "out.obj"
+    assert main(["fair", str(roof), "-o", str(output), *QUIET]) == 0
+    report = json.loads((tmp_path / "report.json").read_text())
+    cut = name != "fair_measures"  # measuring is finished, and nothing more was to be done
+    assert (report["status"] == "interrupted") is cut
+    assert ("interrupted" in capsys.readouterr().out) is cut
+    energies = [report["energies"][when]["normal_variation"] for when in ("before", "after")]
+    assert energies[1] <= energies[0] * (1.0 + 1e-12)
+    assert load_mesh(output).topology.num_faces == load_mesh(roof).topology.num_faces
+
+
+def test_ctrl_c_while_reading_leaves_no_files(
+    roof: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from torchfair.cli import fair
+
+    monkeypatch.setattr(fair, "read_input", nth(fair.read_input, 1, press))
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    assert main(["fair", str(roof), "-o", str(folder / "out.obj"), *QUIET]) == 130
+    assert capsys.readouterr() == ("", "torchfair fair: interrupted\n")
+    assert list(folder.iterdir()) == []
 
 
 def test_options_reach_the_settings(roof: Path, tmp_path: Path) -> None:

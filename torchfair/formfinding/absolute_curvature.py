@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
+from .._interrupts import deferred_interrupts
 from ..curves import ClosedCurve
-from ..energies import total_absolute_curvature
 from ..errors import MeshError, ShapeError
 from ..normalisation import Normalisation
 from ..projection import Callback, ProjectionResult
-from ..subdivision import Refinement, catmull_clark, loop
 from ..topology import Topology
-from ..triangulation import triangulate
-from .boundary_track import BoundaryTrack, new_boundary_vertices
+from .boundary_track import BoundaryTrack
 from .checks import one_start, refuse_degenerate_faces
-from .form_problem import FormProblem, staying_vertices
+from .form_level import FormJob, FormLevel, Handles
+from .form_problem import staying_vertices
 from .form_report import form_measures
 from .form_settings import FormSettings
-from .form_stages import FormStages, stopped
 from .handles import read_handles, refuse_unreachable_handles
+from .stopping import interrupted, stopped
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,8 @@ def minimise_absolute_curvature(
         handles: Places to pass through, by vertex number.
         levels: How often to refine.
         settings: Weights, smoothing and tolerances.
-        callback: Called with every iteration record; returning True stops. Ctrl-C returns the best mesh so far.
+        callback: Called with every iteration record; returning True stops. Ctrl-C, or a function that
+            raises KeyboardInterrupt, returns the best mesh so far, on the finest level on which a step was taken.
 
     Raises:
         ShapeError: vertices or normals are not ``(V, 3)``, or a handle is not a point.
@@ -97,88 +97,52 @@ def minimise_absolute_curvature(
             no vertex or pulls a vertex of the boundary that stays.
     """
     settings = settings or FormSettings()
+    with deferred_interrupts() as interrupts:
+        surface, pulled, before, notes = interrupts.insist(
+            _begin, vertices, topology, curves, normals, handles or {}, settings
+        )
+        job = FormJob(pulled, settings, callback, interrupts)
+        surface, stages = interrupts.insist(job.solved, surface)
+        stage_levels = [0] * len(stages)
+        for level in range(1, levels + 1):
+            if stopped(stages[-1]):
+                break
+            finer = interrupts.attempt(job.solved_finer, surface)
+            if finer is None:
+                stages[-1] = interrupted(stages[-1])
+                break
+            surface, runs = finer
+            stages += runs
+            stage_levels += [level] * len(runs)
+        after = interrupts.insist(form_measures, surface.vertices, surface.topology, surface.normals, *pulled)
+    return FormResult(surface.vertices.to(vertices), surface.topology, stages, stage_levels, before, after, notes)
+
+
+def _begin(
+    vertices: Tensor,
+    topology: Topology,
+    curves: Sequence[ClosedCurve] | None,
+    normals: Tensor | None,
+    handles: Mapping[int, Sequence[float]],
+    settings: FormSettings,
+) -> tuple[FormLevel, Handles, dict[str, float], list[str]]:
+    """The surface to start from, handles, measures and notes."""
     start, topology = one_start(vertices, topology), topology.to("cpu")
     Normalisation.of(start, topology)  # refuses what is not finite or has no extent
     refuse_degenerate_faces(start, topology)
     normals = _unit_normals(normals, topology)
-    pulled, targets = read_handles(handles or {}, topology)
-    notes: list[str] = []
+    pulled, targets = read_handles(handles, topology)
     if curves is None:
         track = BoundaryTrack.through(start, topology, settings.corner_angle)
     else:
         track = BoundaryTrack.onto(start, topology, curves)
     current = track.positions(start)
     refuse_unreachable_handles(pulled, targets, current, staying_vertices(topology, track, settings))
-    before = form_measures(start, topology, normals, pulled, targets)
+    notes = []
     if not topology.is_triangular:
         notes.append("faces with more than three corners are cut into triangles while C is lowered")
-
-    stages: list[ProjectionResult] = []
-    stage_levels: list[int] = []
-    for level in range(levels + 1):
-        if level:
-            refinement = _refine(topology, track)
-            topology = refinement.topology
-            normals = _refined_normals(normals, refinement)
-            track = track.refined(refinement)
-            current = track.positions(refinement.apply(current))
-        solved = _solve(current, topology, track, normals, (pulled, targets), settings, callback, nearby=level > 0)
-        for moved, run in solved:
-            current = moved
-            stages.append(run)
-            stage_levels.append(level)
-        if settings.boundary == "glide":
-            track = track.updated(current)
-            current = track.positions(current)
-        if stopped(stages[-1]):
-            break
-    after = form_measures(current, topology, normals, pulled, targets)
-    return FormResult(current.to(vertices), topology, stages, stage_levels, before, after, notes)
-
-
-def _solve(
-    vertices: Tensor,
-    topology: Topology,
-    track: BoundaryTrack,
-    normals: Tensor,
-    handles: tuple[Tensor, Tensor],
-    settings: FormSettings,
-    callback: Callback | None,
-    *,
-    nearby: bool,
-) -> Iterator[tuple[Tensor, ProjectionResult]]:
-    """One level, in units of the input: the vertices after each stage, and the run."""
-    triangles = topology
-    if not topology.is_triangular:
-        triangles = Topology.from_faces(triangulate(vertices, topology).triangles, topology.num_vertices)
-    normalisation = Normalisation.of(vertices, topology)
-    pulled, targets = handles
-    problem = FormProblem(triangles, normalisation, track, normals, pulled, normalisation.apply(targets), settings)
-
-    def observe(state: Tensor) -> dict[str, float]:
-        return {"total_absolute_curvature": normalisation.length * float(total_absolute_curvature(state, triangles))}
-
-    stages = FormStages(problem, callback, observe)
-    start = normalisation.apply(vertices)
-    for moved, run in stages.from_nearby(start) if nearby else stages.from_afar(start):
-        yield torch.where(problem.fixed[:, None], vertices, normalisation.invert(moved)), run
-
-
-def _refine(topology: Topology, track: BoundaryTrack) -> Refinement:
-    """Loop or Catmull-Clark; the boundary stays where it is, new vertices are put on the curves afterwards."""
-    scheme = loop if topology.is_triangular else catmull_clark
-    return scheme(topology, boundary="interpolate", corners=track.corners)
-
-
-def _refined_normals(normals: Tensor, refinement: Refinement) -> Tensor:
-    """Prescribed normals of the finer boundary: a new vertex has the mean of both ends if both are prescribed."""
-    ends = normals[refinement.coarse.boundary_edges]
-    mean = ends.sum(1)
-    given = (ends != 0.0).any(2).all(1) & (mean != 0.0).any(1)
-    mean = torch.where(given[:, None], mean / mean.norm(dim=1, keepdim=True), torch.zeros_like(mean))
-    result = refinement.carry_vertex_labels(normals)
-    result[new_boundary_vertices(refinement)] = mean
-    return result
+    before = form_measures(start, topology, normals, pulled, targets)
+    return FormLevel(current, topology, track, normals), (pulled, targets), before, notes
 
 
 def _unit_normals(normals: Tensor | None, topology: Topology) -> Tensor:

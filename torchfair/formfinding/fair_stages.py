@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ..projection import Callback, GuidedProjection, ProjectionResult, Status
+from ..projection import Callback, GuidedProjection, ProjectionResult
 from ..projection.run import Observe
 from .fair_problem import FairProblem
+from .stopping import stopped
 
 _SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
 _LARGEST_SHARE = 1.3
@@ -48,10 +49,10 @@ class FairStages:
         while stages:
             stage = stages.pop(0)
             run = self._run(stage, last=not stages)
-            self._blocks = problem.blocks(run.blocks["vertices"])
             yield run
-            if run.status in (Status.INTERRUPTED, Status.CALLBACK):
+            if stopped(run):
                 return
+            self._blocks = problem.blocks(run.blocks["vertices"])
             if not stages and stage.share < _LARGEST_SHARE and not problem.is_planar(problem.placed(run.blocks)):
                 stages.append(Stage(stage.share + _SHARE_STEP, 1.0))
 

@@ -8,10 +8,11 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from ..projection import Callback, ElementTerm, GuidedProjection, ProjectionResult, ProjectionSettings, Status
+from ..projection import Callback, ElementTerm, GuidedProjection, ProjectionResult, ProjectionSettings
 from ..projection.layout import State
 from .face_guard import FaceGuard
 from .form_problem import FormProblem
+from .stopping import stopped
 
 Observe = Callable[[Tensor], dict[str, float]]
 Stage = tuple[Tensor, ProjectionResult]
@@ -21,7 +22,7 @@ _ROUGHLY, _THOROUGHLY = 5.0, 0.1  # tolerances of stages along normals, over tho
 
 
 class FormStages:
-    """Runs stage after stage; every method gives the vertices after each, and ends early when a stage was stopped.
+    """Runs stage after stage; every method gives the best vertices after each, and ends early when one was stopped.
 
     Args:
         problem: Of one level.
@@ -52,11 +53,14 @@ class FormStages:
         if stopped(found[-1][1]):
             return
         if self._is_doubtful(found, start):
-            fine = yield from _all(self._along_normals(start, smoothings[-1:], settings.fairness_weight))
-            if stopped(fine[-1][1]):
+            coarse = found[-1][0]
+            fine, run = self._one_along_normals(start, smoothings[-1], settings.fairness_weight, correct=False)
+            is_better = self._is_better(fine, coarse, start)
+            yield (fine if is_better else coarse), run
+            if stopped(run):
                 return
-            if self._is_better(fine[-1][0], found[-1][0], start):
-                yield from self._in_space(fine[-1][0], smoothings[-1:])
+            if is_better:
+                yield from self._in_space(fine, smoothings[-1:])
                 return
         yield from self._in_space(found[-1][0], smoothings[-2:])
 
@@ -112,7 +116,7 @@ class FormStages:
         for fraction in smoothings:
             if correct:
                 self._known.clear()  # patches may fit at other vertices than before
-            vertices, run = self._one_along_normals(vertices, fraction, fairness, correct)
+            vertices, run = self._one_along_normals(vertices, fraction, fairness, correct=correct)
             yield vertices, run
             if stopped(run):
                 return
@@ -135,7 +139,7 @@ class FormStages:
             return replace(own, merit_tolerance=_ROUGHLY * own.merit_tolerance, patience=1, when_settled="stop")
         return replace(own, merit_tolerance=_THOROUGHLY * own.merit_tolerance, when_settled="stop")
 
-    def _one_along_normals(self, base: Tensor, fraction: float, fairness: float, correct: bool) -> Stage:
+    def _one_along_normals(self, base: Tensor, fraction: float, fairness: float, *, correct: bool) -> Stage:
         problem = self.problem
         directions = problem.directions(base)
 
@@ -152,11 +156,6 @@ class FormStages:
             guard=FaceGuard(problem.topology, place),
         )
         return place(run.blocks), run
-
-
-def stopped(run: ProjectionResult) -> bool:
-    """Whether someone stopped the run."""
-    return run.status in (Status.INTERRUPTED, Status.CALLBACK)
 
 
 def _all(stages: Iterator[Stage]) -> Generator[Stage, None, list[Stage]]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
+from .._interrupts import deferred_interrupts
 from ..energies import normal_variation
 from ..normalisation import Normalisation
 from ..projection import Callback, ProjectionResult
@@ -19,6 +21,7 @@ from .fair_report import fair_measures
 from .fair_stages import FairStages
 from .handles import read_handles
 from .settings import FairSettings
+from .stopping import interrupted
 
 Mesh = tuple[Tensor, Topology]
 
@@ -74,43 +77,73 @@ def minimise_normal_variation(
             limit, the reference is given up (design mode, paper Fig. 12) and a note says so.
         settings: Weights, bounds and tolerances.
         callback: Called with every iteration record, whose quantities hold ``normal_variation``; returning
-            True stops. Ctrl-C returns the best mesh so far.
+            True stops. Ctrl-C, or a function that raises KeyboardInterrupt, returns the best mesh so far.
 
     Raises:
         ShapeError: vertices are not ``(V, 3)``, or a handle is not a point.
         MeshError: vertices are not finite, a face has no area, or a handle is no vertex.
     """
-    settings = settings or FairSettings()
-    start, topology = one_start(vertices, topology), topology.to("cpu")
-    normalisation = Normalisation.of(start, topology)
-    pulled, targets = read_handles(handles or {}, topology)
-    problem = FairProblem(
-        normalisation.apply(start),
-        topology,
-        None
-        if reference is None
-        else (normalisation.apply(reference[0].detach().to("cpu", torch.float64)), reference[1]),
-        dict(zip(pulled.tolist(), normalisation.apply(targets), strict=True)),
-        settings,
-    )
+    with deferred_interrupts() as interrupts:
+        job = interrupts.insist(_Job.of, vertices, topology, reference, handles, settings or FairSettings())
+        runs, cut = interrupts.collect(lambda: FairStages(job.problem, callback, job.observe))
+        if cut:
+            runs[-1] = interrupted(runs[-1])
+        return interrupts.insist(job.result, vertices, runs)
 
-    def observe(state: State) -> dict[str, float]:
-        return {"normal_variation": normalisation.length * float(normal_variation(problem.placed(state), topology))}
 
-    runs = list(FairStages(problem, callback, observe))
-    state = problem.placed(runs[-1].blocks)
-    moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(state))
-    after = fair_measures(moved, start, topology, problem, normalisation)
-    if after["largest_handle_distance"] > _HANDLE_REACHED * normalisation.length:
-        problem.notes.append(
-            f"a handle ends {after['largest_handle_distance']:.3g} from its target: faces would become too small "
-            "or too thin; allow smaller angles and areas, or pull less"
+class _Job(NamedTuple):
+    """The job with its problem in normalised units; ``start`` is in those of the input."""
+
+    start: Tensor
+    topology: Topology
+    normalisation: Normalisation
+    problem: FairProblem
+
+    @classmethod
+    def of(
+        cls,
+        vertices: Tensor,
+        topology: Topology,
+        reference: Mesh | None,
+        handles: Mapping[int, Sequence[float]] | None,
+        settings: FairSettings,
+    ) -> _Job:
+        start, topology = one_start(vertices, topology), topology.to("cpu")
+        normalisation = Normalisation.of(start, topology)
+        pulled, targets = read_handles(handles or {}, topology)
+        problem = FairProblem(
+            normalisation.apply(start),
+            topology,
+            None
+            if reference is None
+            else (normalisation.apply(reference[0].detach().to("cpu", torch.float64)), reference[1]),
+            dict(zip(pulled.tolist(), normalisation.apply(targets), strict=True)),
+            settings,
         )
-    return FairResult(
-        vertices=moved.to(vertices),
-        projection=runs[-1],
-        preparation=runs[:-1],
-        before=fair_measures(start, start, topology, problem, normalisation),
-        after=after,
-        notes=problem.notes,
-    )
+        return cls(start, topology, normalisation, problem)
+
+    def observe(self, state: State) -> dict[str, float]:
+        """What the history holds."""
+        energy = float(normal_variation(self.problem.placed(state), self.topology))
+        return {"normal_variation": self.normalisation.length * energy}
+
+    def result(self, vertices: Tensor, runs: list[ProjectionResult]) -> FairResult:
+        """The mesh after all runs, in the dtype and on the device of the input ``vertices``, and its measures."""
+        start, topology, normalisation, problem = self
+        state = problem.placed(runs[-1].blocks)
+        moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(state))
+        after = fair_measures(moved, start, topology, problem, normalisation)
+        notes = list(problem.notes)
+        if after["largest_handle_distance"] > _HANDLE_REACHED * normalisation.length:
+            notes.append(
+                f"a handle ends {after['largest_handle_distance']:.3g} from its target: faces would become too small "
+                "or too thin; allow smaller angles and areas, or pull less"
+            )
+        return FairResult(
+            vertices=moved.to(vertices),
+            projection=runs[-1],
+            preparation=runs[:-1],
+            before=fair_measures(start, start, topology, problem, normalisation),
+            after=after,
+            notes=notes,
+        )

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
+from .._interrupts import deferred_interrupts
 from ..principal import PrincipalEdges
 from ..projection import Callback, ProjectionResult
 from ..topology import Topology
 from .handles import read_handles
+from .stopping import interrupted, interrupted_at_the_start
 from .symmetric_design import SymmetricDesign
 from .symmetric_settings import SymmetricSettings
 
@@ -48,7 +50,8 @@ class SymmetricResult:
     Attributes:
         levels: One for every level; the first has the vertices of the input.
         notes: Decisions taken and conditions missed, in words.
-        stopped: Whether Ctrl-C or the callback ended it early; the last level is the best state found.
+        stopped: Whether Ctrl-C or the callback ended it early; the last level is the best state found,
+            or was finished before.
     """
 
     levels: list[SymmetricLevel]
@@ -126,29 +129,49 @@ def principal_symmetric(
         MeshError: vertices are not finite, a face has no area, a handle is no vertex or fixed, or no condition can be
             imposed.
     """
-    pulled, targets = read_handles(handles or {}, principal.topology)
-    design = SymmetricDesign(
-        vertices, principal, handles=pulled.tolist(), fixed=fixed, reference=reference, on=on, settings=settings
-    )
-    places = dict(zip(pulled.tolist(), targets.tolist(), strict=True))
+
+    def begin() -> tuple[SymmetricDesign, dict[int, list[float]], dict[str, float]]:
+        pulled, targets = read_handles(handles or {}, principal.topology)
+        design = SymmetricDesign(
+            vertices, principal, handles=pulled.tolist(), fixed=fixed, reference=reference, on=on, settings=settings
+        )
+        return design, dict(zip(pulled.tolist(), targets.tolist(), strict=True)), design.measures()
+
     done: list[SymmetricLevel] = []
     notes: list[str] = []
-    stopped = False
-    for level in range(levels + 1):
-        if level:
-            design = design.refined()
-        before = design.measures()
-        stopped = design.solve(callback) if level else design.move(places, callback)
-        after = design.measures()
-        done.append(
-            SymmetricLevel(
-                design.vertices.to(vertices), design.principal, design.normals(), before, after, list(design.runs)
-            )
-        )
-        notes += [f"level {level}: {note}" if levels else note for note in _missed(after, design.settings)]
-        if stopped:
-            break
+    with deferred_interrupts() as interrupts:
+        design, places, before = interrupts.insist(begin)
+        stopped = interrupts.insist(design.move, places, callback)
+        for level in range(levels + 1):
+            if level:
+                finer = interrupts.attempt(_solved_finer, design, callback)
+                if finer is None:
+                    stopped, runs = True, done[-1].runs
+                    runs[-1] = interrupted(runs[-1])
+                    break
+                design, before, stopped = finer
+            made = interrupts.insist(_level, design, before, vertices)
+            done.append(made)
+            notes += [f"level {level}: {note}" if levels else note for note in _missed(made.after, design.settings)]
+            if stopped:
+                break
     return SymmetricResult(done, notes, stopped)
+
+
+def _solved_finer(
+    design: SymmetricDesign, callback: Callback | None
+) -> tuple[SymmetricDesign, dict[str, float], bool] | None:
+    """The refined design, its measures at the start, and whether it was stopped; None if interrupted at the start."""
+    finer = design.refined()
+    before = finer.measures()
+    stopped = finer.solve(callback)
+    return None if interrupted_at_the_start(finer.runs) else (finer, before, stopped)
+
+
+def _level(design: SymmetricDesign, before: dict[str, float], like: Tensor) -> SymmetricLevel:
+    """The mesh of a design, in the dtype and on the device of ``like``."""
+    vertices, runs = design.vertices.to(like), list(design.runs)
+    return SymmetricLevel(vertices, design.principal, design.normals(), before, design.measures(), runs)
 
 
 def _missed(after: dict[str, float], settings: SymmetricSettings) -> list[str]:

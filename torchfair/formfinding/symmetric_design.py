@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import torch
 from torch import Tensor
 
+from .._interrupts import deferred_interrupts
 from .._threads import threads_for
 from ..boundary import boundary_corners
 from ..constraints import BoundaryNormals
@@ -15,7 +17,7 @@ from ..geometry.closest_point import ReferenceSurface
 from ..normalisation import Normalisation
 from ..principal import PrincipalEdges
 from ..principal.principal_edges import PrincipalStars
-from ..projection import Callback, ProjectionResult
+from ..projection import Callback, ProjectionResult, Status
 from ..subdivision import Refinement, interpolate_vertices, loop, near
 from ..subdivision.interpolation import BOUNDARY_CORNER
 from ..topology import Topology
@@ -96,21 +98,36 @@ class SymmetricDesign:
 
         The shape is found with weighted conditions; then they are met exactly, by the shortest way. Where that fails
         it is tried again with handles that pull less: they yield to the conditions. A few saddle sides that come out
-        wrong are tried again with a wider margin. The best state found is kept.
+        wrong are tried again with a wider margin. The best state found is kept, also after Ctrl-C. Where a callback
+        raises any other error, the design is as it was before.
 
         Args:
             callback: Called with every iteration record; returning True stops.
             rounds: How often that is tried, by default as the settings say. With 1 the answer is fast enough to
                 follow a handle that is dragged; solve again when it is let go.
         """
+        return self._edited(self.problem.targets, callback, rounds)
+
+    def _edited(self, targets: Tensor, callback: Callback | None, rounds: int | None) -> bool:
+        """Solves for handles at ``targets`` (n, 3), normalised. Errors leave everything as it was."""
         changes = self._reference is not None or self.settings.energy_weight > 0.0
-        with threads_for(self.vertices.numel(), self.vertices.device):
+        with deferred_interrupts() as interrupts:
+            restore = interrupts.insist(self.problem.snapshot)
             work = SymmetricRounds(self.problem, self.principal, self._state, callback)
-            stopped = work.run(rounds or self.settings.rounds, settled=not changes)
-        self.runs += work.runs
-        self._state = work.state
-        moved = self.normalisation.invert(self._state["vertices"])
-        self.vertices = torch.where(self.fixed[:, None], self.vertices, moved)
+            try:
+                self.problem.targets = targets
+                with threads_for(self.vertices.numel(), self.vertices.device):
+                    stopped = interrupts.insist(partial(work.run, settled=not changes), rounds or self.settings.rounds)
+                moved = interrupts.insist(self.normalisation.invert, work.state["vertices"])
+                vertices = torch.where(self.fixed[:, None], self.vertices, moved)
+            except BaseException as error:
+                restore()
+                if not isinstance(error, Exception):
+                    self.problem.forget_compiled()
+                raise
+            if work.runs and work.runs[-1].status is Status.INTERRUPTED:
+                self.problem.forget_compiled()
+            self.runs, self._state, self.vertices = [*self.runs, *work.runs], work.state, vertices
         return stopped
 
     def move(
@@ -133,8 +150,7 @@ class SymmetricDesign:
             if vertex not in rows:
                 raise MeshError(f"vertex {vertex} is no handle of this design: handles are {list(rows)[:10]}")
             moved[rows[vertex]] = place
-        self.problem.targets = moved
-        return self.solve(callback, rounds=rounds)
+        return self._edited(moved, callback, rounds)
 
     def refined(self) -> SymmetricDesign:
         """The design on the mesh refined by Loop subdivision, labels, handles and fixed vertices carried along.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
 
 import torch
@@ -70,11 +71,28 @@ class SymmetricProblem:
         self.pull = 1.0
         self.edges = between_stars(self.topology.edges[principal.mask], stars)
         self.sides = SaddleSides(stars, margin=settings.saddle_margin)
-        self._planes = None if reference is None else TangentPlanes(reference)
+        self._reference = reference
         self._compiled: dict[Aim, GuidedProjection] = {}
+        self.forget_compiled()
         self._angles = corner_angles(base, self.topology)
         self._smallest_angle = min(settings.smallest_angle, 0.8 * float(self._angles.min()))
         self._keeps_faces = FaceGuard(self.topology, lambda state: state["vertices"])
+
+    def snapshot(self) -> Callable[[], None]:
+        """A function that puts targets, pull and saddle sides back to what they are now."""
+        targets, pull, sides, compiled = self.targets.clone(), self.pull, self.sides, dict(self._compiled)
+        saved = {name: value.clone() if isinstance(value, Tensor) else value for name, value in vars(sides).items()}
+
+        def restore() -> None:
+            self.targets, self.pull, self._compiled = targets, pull, compiled
+            vars(sides).update(saved)
+
+        return restore
+
+    def forget_compiled(self) -> None:
+        """Compiles anew from now on: what was interrupted while it searched or factorised may not be whole."""
+        self._compiled = {}
+        self._planes = None if self._reference is None else TangentPlanes(self._reference)
 
     def blocks(self, vertices: Tensor) -> State:
         """Variable blocks that fit ``vertices``."""

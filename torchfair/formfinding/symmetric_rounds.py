@@ -8,11 +8,13 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from .._interrupts import deferred_interrupts
 from ..constraints.saddle_sides import beyond_tangent_plane, is_negative
 from ..principal import PrincipalEdges
-from ..projection import Callback, ProjectionResult, ProjectionSettings, Status
+from ..projection import Callback, ProjectionResult, ProjectionSettings
 from ..projection.layout import State
 from ..stars import pyramid_self_intersections
+from .stopping import interrupted, stopped
 from .symmetric_problem import Aim, SymmetricProblem
 from .symmetric_report import condition_residuals
 
@@ -57,6 +59,7 @@ class SymmetricRounds:
         self.problem, self.principal, self.settings = problem, principal, problem.settings
         self.state, self.callback = state, callback
         self.runs: list[ProjectionResult] = []
+        self._best: tuple[tuple[float, int], State] | None = None
 
     def run(self, rounds: int, *, settled: bool) -> bool:
         """Runs round after round until conditions and saddle sides are right; whether it was stopped.
@@ -65,20 +68,28 @@ class SymmetricRounds:
             rounds: At most so many.
             settled: Whether a state that meets them, with handles at their targets, is all that is asked for.
         """
+        with deferred_interrupts() as interrupts:
+            try:
+                return self._search(rounds, settled)
+            except KeyboardInterrupt:  # between runs, which keep their own best state
+                if not self.runs:
+                    raise
+                self.runs[-1] = interrupted(self.runs[-1])
+                interrupts.insist(self._take_best)
+                return True
+
+    def _search(self, rounds: int, settled: bool) -> bool:
         if settled and self._farthest() <= self.settings.tolerance and self._is_right(self._score()):
             return self._run(Aim.CONDITIONS, _EXACT)
         start, pulled = self.state, self._farthest() > _PULLED
-        best: tuple[tuple[float, int], State] | None = None
         problem = self.problem
         problem.sides.margin, problem.pull = self.settings.saddle_margin, 1.0
         problem.sides.forget()
-        stopped = False
+        ended = False
         for attempt in range(rounds):
-            stopped = self._round(first=attempt == 0)
-            score = self._score()
-            if best is None or score < best[0]:
-                best = (score, self.state)
-            if stopped or self._is_right(score) or not self._steps_left():
+            ended = self._round(first=attempt == 0)
+            score = self._note_score()
+            if ended or self._is_right(score) or not self._steps_left():
                 break
             many = attempt > 0 and score[1] > _FEW * problem.stars.vertices.shape[0]
             if pulled and (many or score[0] > self.settings.tolerance):
@@ -88,9 +99,21 @@ class SymmetricRounds:
                 problem.sides.margin *= _MORE_MARGIN
                 if attempt >= _PATIENT_ROUNDS:
                     problem.sides.reconsider(self.state["vertices"])
-        if best is not None:
-            self.state = best[1]
-        return stopped
+        if self._best is not None:
+            self.state = self._best[1]
+        return ended
+
+    def _note_score(self) -> tuple[float, int]:
+        """The score of the state, which is remembered if it is the best so far."""
+        score = self._score()
+        if self._best is None or score < self._best[0]:
+            self._best = (score, self.state)
+        return score
+
+    def _take_best(self) -> None:
+        self._note_score()
+        if self._best is not None:
+            self.state = self._best[1]
 
     # ---- one round ---------------------------------------------------------------------------------------
 
@@ -122,10 +145,12 @@ class SymmetricRounds:
         portions = math.ceil(self._farthest() / _LONGEST_PULL)
         for portion in range(1, min(portions, _MOST_PORTIONS)):
             self.problem.targets = start.lerp(end, portion / portions)
-            self._decide()
-            stopped = self._run(Aim.SEARCH, replace(self.settings.projection, max_iterations=_PORTION_STEPS))
-            self.problem.targets = end
-            if stopped:
+            try:
+                self._decide()
+                ended = self._run(Aim.SEARCH, replace(self.settings.projection, max_iterations=_PORTION_STEPS))
+            finally:
+                self.problem.targets = end
+            if ended:
                 return True
         return False
 
@@ -144,7 +169,7 @@ class SymmetricRounds:
         )
         self.runs.append(run)
         self.state = run.blocks
-        return run.status in (Status.INTERRUPTED, Status.CALLBACK)
+        return stopped(run)
 
     def _steps_left(self) -> int:
         return max(0, self.settings.most_steps - sum(run.iterations for run in self.runs))

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._interrupts import Interrupts, deferred_interrupts
 from .evaluate import culprit, residual_tables
 from .layout import State
 from .problem import Problem
 from .result import IterationRecord, ProjectionResult, Status, TermResidual
 from .settings import ProjectionSettings
+from .state import ProjectionState
 from .steps import init, of_members, record_of, step
 from .stopwatch import Stopwatch
+from .unbegun import unbegun
 
 _LEAVE = 0.5  # share of finished members at which the others go on without them
 
@@ -33,35 +36,47 @@ class BatchRun:
         count = next(iter(blocks.values())).shape[0]
         self._members = list(range(count))  # of the system, by their numbers in the batch
         self._problem = problem.batched(count)
-        self._state = init(self._problem, {name: block.flatten(0, 1) for name, block in blocks.items()}, settings)
-        self._start = self._tables()
+        self._blocks = {name: block.flatten(0, 1) for name, block in blocks.items()}
         self._histories: list[list[IterationRecord]] = [[] for _ in range(count)]
         self._results: dict[int, ProjectionResult] = {}
 
     def results(self) -> list[ProjectionResult]:
         """One for each member, in order. Ctrl-C ends those that are not yet at their end."""
-        self._note({})
-        try:
-            while self._going():
-                late = self._settings.time_limit is not None and self._watch.elapsed > self._settings.time_limit
-                if late:
-                    self._retire(Status.TIME_LIMIT)
-                    break
-                if len(self._going()) <= _LEAVE * len(self._members):
-                    self._leave()
-                self._state, record = step(self._problem, self._state)
-                self._note(record.timings)
-        except KeyboardInterrupt:
-            self._retire(Status.INTERRUPTED)
+        with deferred_interrupts() as interrupts:
+            try:
+                state = interrupts.interruptible(init, self._problem, self._blocks, self._settings)
+            except KeyboardInterrupt:
+                return unbegun(self._problem, self._blocks, self._watch)
+            self._begin(state)
+            try:
+                self._loop(interrupts)
+            except KeyboardInterrupt:
+                self._retire(Status.INTERRUPTED)
         return [self._results[member] for member in range(len(self._histories))]
+
+    def _begin(self, state: ProjectionState) -> None:
+        self._state = state
+        self._start = self._tables()
+        self._note({})
+
+    def _loop(self, interrupts: Interrupts) -> None:
+        while self._going():
+            late = self._settings.time_limit is not None and self._watch.elapsed > self._settings.time_limit
+            if late:
+                self._retire(Status.TIME_LIMIT)
+                break
+            if len(self._going()) <= _LEAVE * len(self._members):
+                self._leave(interrupts)
+            self._state, record = interrupts.interruptible(step, self._problem, self._state)
+            self._note(record.timings)
 
     def _going(self) -> list[int]:
         """Places in the system of members that are not at their end."""
         return [place for place, member in enumerate(self._members) if member not in self._results]
 
-    def _leave(self) -> None:
+    def _leave(self, interrupts: Interrupts) -> None:
         places = self._going()
-        self._problem, self._state = of_members(self._single, self._state, places)
+        self._problem, self._state = interrupts.interruptible(of_members, self._single, self._state, places)
         self._members = [self._members[place] for place in places]
 
     def _note(self, timings: dict[str, float]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from .._interrupts import Interrupts, deferred_interrupts
 from .evaluate import culprit, residual_table
 from .layout import State
 from .problem import Problem
@@ -14,6 +15,7 @@ from .state import ProjectionState
 from .steps import finished, init, record_of, step
 from .stopwatch import Stopwatch
 from .trials import Guard
+from .unbegun import unbegun
 
 _PARTS = ("linearise", "solve", "merit")
 
@@ -40,47 +42,63 @@ class Run:
     ) -> None:
         self._watch = Stopwatch()
         self._problem, self._callback, self._observe, self._guard = problem, callback, observe, guard
-        self._start = self._state = init(problem, blocks, settings)
+        self._blocks, self._settings = blocks, settings
+        self._states: list[ProjectionState] = []  # the start and the best one
         self._quantities: dict[str, float] = {}
         self._history: list[IterationRecord] = []
 
     def result(self) -> ProjectionResult:
-        """Steps until a tolerance, a limit, the callback or an interruption ends it."""
-        problem = self._problem
-        try:
-            status = self._loop()
-        except KeyboardInterrupt:
-            status = Status.INTERRUPTED
-        detail = culprit(problem.structure, self._state.blocks) if status is Status.SINGULAR else ""
+        """Steps until a tolerance, a limit, the callback or an interruption ends it.
+
+        Functions of the problem and of the user may be interrupted; what is to be kept of them may not.
+        """
+        with deferred_interrupts() as interrupts:
+            try:
+                status = self._loop(interrupts)
+            except KeyboardInterrupt:
+                status = Status.INTERRUPTED
+            if not self._states:
+                return unbegun(self._problem, self._blocks, self._watch)[0]
+            return interrupts.insist(self._result, status)
+
+    def _loop(self, interrupts: Interrupts) -> Status:
+        state = interrupts.interruptible(init, self._problem, self._blocks, self._settings)
+        self._states = [state, state]
+        if self._stops(interrupts, record_of(state), state):
+            return Status.CALLBACK
+        limit = state.settings.time_limit
+        while (status := finished(state)) is None:
+            if limit is not None and self._watch.elapsed > limit:
+                return Status.TIME_LIMIT
+            state, record = interrupts.interruptible(step, self._problem, state, self._guard)
+            self._states[1] = state
+            if finished(state) is not Status.SINGULAR and self._stops(interrupts, record, state):
+                return Status.CALLBACK
+        return status
+
+    def _stops(self, interrupts: Interrupts, record: IterationRecord, state: ProjectionState) -> bool:
+        """Keeps the record, with the observed quantities of the best state; True when the callback says stop."""
+        record = replace(record, elapsed=self._watch.elapsed, quantities=dict(self._quantities))
+        if record.accepted and self._observe is not None:
+            self._history.append(replace(record, quantities={}))  # all that is known should it be interrupted
+            self._quantities = interrupts.interruptible(self._observe, state.blocks)
+            self._history.pop()
+            record = replace(record, elapsed=self._watch.elapsed, quantities=dict(self._quantities))
+        self._history.append(record)
+        seen = replace(record, state=state)
+        return self._callback is not None and bool(interrupts.interruptible(self._callback, seen))
+
+    def _result(self, status: Status) -> ProjectionResult:
+        problem, (start, best) = self._problem, self._states
+        detail = culprit(problem.structure, best.blocks) if status is Status.SINGULAR else ""
         timings = {part: sum(r.timings.get(part, 0.0) for r in self._history) for part in _PARTS}
         return ProjectionResult(
-            blocks=self._state.blocks,
+            blocks=best.blocks,
             status=status,
             message=f"{status.value}; {detail}" if detail else status.value,
-            residuals=residual_table(problem.structure, problem.terms, self._state.evaluation),
-            initial_residuals=residual_table(problem.structure, problem.terms, self._start.evaluation),
+            residuals=residual_table(problem.structure, problem.terms, best.evaluation),
+            initial_residuals=residual_table(problem.structure, problem.terms, start.evaluation),
             history=self._history,
             solver=problem.solver.name,
             timings={**timings, "total": self._watch.elapsed},
         )
-
-    def _loop(self) -> Status:
-        state = self._start
-        if self._stops(record_of(state), state):
-            return Status.CALLBACK
-        limit = state.settings.time_limit
-        while (status := finished(self._state)) is None:
-            if limit is not None and self._watch.elapsed > limit:
-                return Status.TIME_LIMIT
-            self._state, record = step(self._problem, self._state, self._guard)
-            if finished(self._state) is not Status.SINGULAR and self._stops(record, self._state):
-                return Status.CALLBACK
-        return status
-
-    def _stops(self, record: IterationRecord, state: ProjectionState) -> bool:
-        """Keeps the record, with the observed quantities of the best state; True when the callback says stop."""
-        if record.accepted and self._observe is not None:
-            self._quantities = self._observe(state.blocks)
-        record = replace(record, elapsed=self._watch.elapsed, quantities=dict(self._quantities))
-        self._history.append(record)
-        return self._callback is not None and bool(self._callback(replace(record, state=state)))
