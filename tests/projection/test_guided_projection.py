@@ -265,7 +265,7 @@ class Counting(ScipyDirect):
 
 
 def test_starts_and_batches_share_the_analysis() -> None:
-    vertices, topology = wavy_grid(triangles=True)
+    vertices, topology = wavy_grid(10, 9, triangles=True)
     batch = torch.stack([vertices, vertices + 0.1 * torch.sin(vertices), 1.2 * vertices])
     problem = GuidedProjection({"vertices": vertices}, [length_term(topology)], solver=Counting())
     Counting.analyses = 0

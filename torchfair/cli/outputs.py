@@ -74,6 +74,8 @@ class Outputs:
             "status": run.status.name.lower(),
             "message": run.message,
             "converged": run.status.converged,
+            "scaled_gradient": run.gradient,
+            "recent_fall": run.recent_fall,
             "solver": run.solver,
             "notes": result.notes,
         }

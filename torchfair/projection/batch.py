@@ -8,7 +8,7 @@ from .._interrupts import Interrupts, deferred_interrupts
 from .evaluate import culprit, residual_tables
 from .layout import State
 from .problem import Problem
-from .result import IterationRecord, ProjectionResult, Status, TermResidual
+from .result import IterationRecord, ProjectionResult, Status, TermResidual, message_of
 from .settings import ProjectionSettings
 from .state import ProjectionState
 from .steps import init, of_members, record_of, step
@@ -101,11 +101,11 @@ class BatchRun:
     def _result(
         self, member: int, status: Status, blocks: dict[str, Tensor], table: list[TermResidual]
     ) -> ProjectionResult:
-        detail = f"; {culprit(self._single.structure, blocks)}" if status is Status.SINGULAR else ""
+        detail = culprit(self._single.structure, blocks) if status is Status.SINGULAR else ""
         return ProjectionResult(
             blocks=blocks,
             status=status,
-            message=status.value + detail,
+            message=message_of(status, self._histories[member], detail),
             residuals=table,
             initial_residuals=self._start[member],
             history=self._histories[member],

@@ -143,8 +143,7 @@ class ProjectionResult:
     @property
     def recent_fall(self) -> float:
         """By which fraction the merit still fell in the last ten accepted steps (or in as many as there were)."""
-        merits = [record.merit for record in self.history if record.accepted][-_RECENT - 1 :]
-        return (merits[0] - merits[-1]) / merits[0] if merits and merits[0] > 0.0 else 0.0
+        return _recent_fall(self.history)
 
     @property
     def iterations(self) -> int:
@@ -159,3 +158,18 @@ class ProjectionResult:
             for r in self.residuals
         ]
         return "\n".join(lines)
+
+
+def message_of(status: Status, history: list[IterationRecord], detail: str = "") -> str:
+    """What a status means, and how near a minimum the last state is."""
+    parts = [status.value, *([detail] if detail else [])]
+    if history and status is not Status.ZERO_MERIT:
+        gradient, fall = history[-1].gradient, 100.0 * _recent_fall(history)
+        steps = min(sum(record.accepted for record in history) - 1, _RECENT)
+        parts.append(f"scaled gradient {gradient:.1e} (0 at a minimum), merit -{fall:.2g} % in the last {steps} steps")
+    return "; ".join(parts)
+
+
+def _recent_fall(history: list[IterationRecord]) -> float:
+    merits = [record.merit for record in history if record.accepted][-_RECENT - 1 :]
+    return (merits[0] - merits[-1]) / merits[0] if merits and merits[0] > 0.0 else 0.0

@@ -9,7 +9,7 @@ from .._interrupts import Interrupts, deferred_interrupts
 from .evaluate import culprit, residual_table
 from .layout import State
 from .problem import Problem
-from .result import IterationRecord, ProjectionResult, Status
+from .result import IterationRecord, ProjectionResult, Status, message_of
 from .settings import ProjectionSettings
 from .state import ProjectionState
 from .steps import finished, init, record_of, step
@@ -95,7 +95,7 @@ class Run:
         return ProjectionResult(
             blocks=best.blocks,
             status=status,
-            message=f"{status.value}; {detail}" if detail else status.value,
+            message=message_of(status, self._history, detail),
             residuals=residual_table(problem.structure, problem.terms, best.evaluation),
             initial_residuals=residual_table(problem.structure, problem.terms, start.evaluation),
             history=self._history,
