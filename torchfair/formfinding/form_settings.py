@@ -18,7 +18,7 @@ def _default_projection() -> ProjectionSettings:
         max_iterations=40,
         initial_damping=1e-2,
         damping_scale="identity",
-        merit_tolerance=2e-3,
+        merit_tolerance=1e-3,
         patience=2,
         when_settled="judge",
     )

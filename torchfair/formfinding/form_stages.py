@@ -18,7 +18,7 @@ Observe = Callable[[Tensor], dict[str, float]]
 Stage = tuple[Tensor, ProjectionResult]
 
 _TANGENT_ROUNDS = 3
-_ROUGHLY, _THOROUGHLY = 5.0, 0.1  # tolerances of stages along normals, over those in space
+_ROUGHLY, _THOROUGHLY = 10.0, 0.1  # tolerances of stages along normals, over those in space
 
 
 class FormStages:

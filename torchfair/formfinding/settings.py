@@ -17,7 +17,7 @@ FORMULATIONS = ("reduced", "lifted")
 
 def _default_projection() -> ProjectionSettings:
     return ProjectionSettings(
-        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=2e-3, patience=6
+        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=5e-4, patience=6
     )
 
 
@@ -88,4 +88,4 @@ class FairSettings:
     def stage(self) -> ProjectionSettings:
         """Settings of a stage before the last: fewer steps, wider tolerance."""
         most = min(20, self.projection.max_iterations)
-        return replace(self.projection, max_iterations=most, merit_tolerance=1e-2, patience=6, when_settled="stop")
+        return replace(self.projection, max_iterations=most, merit_tolerance=4e-3, patience=6, when_settled="stop")

@@ -18,9 +18,10 @@ def _default_projection() -> ProjectionSettings:
         max_iterations=12,
         initial_damping=1e-3,
         damping_scale="identity",
-        merit_tolerance=6e-2,
+        merit_tolerance=3e-2,
         patience=2,
         when_settled="stop",
+        least_uncorrected_gain=-math.inf,
     )
 
 

@@ -9,6 +9,8 @@ from .damping import Damping
 from .result import Status
 from .settings import ProjectionSettings
 
+_PATIENCE_WHEN_DAMPED = 4
+
 
 @dataclass(frozen=True)
 class Standing:
@@ -114,21 +116,25 @@ class Course:
             tried,
             standing=standing,
             damping=outcome.damping.accepted(outcome.gain),
-            falls=(*self.falls, fall)[-settings.patience :],
+            falls=(*self.falls, fall)[-_PATIENCE_WHEN_DAMPED * settings.patience :],
             doubted=False,
         )
         if outcome.short:
             return replace(moved, suspicion=Status.STEP_TOLERANCE)
-        return moved._rested(settings, inexact)
+        return moved._rested(outcome.damping.value, settings, inexact)
 
-    def _rested(self, settings: ProjectionSettings, inexact: bool) -> Course:
+    def _rested(self, damping: float, settings: ProjectionSettings, inexact: bool) -> Course:
         """Whether the merit has come to rest; if so, with an iterative linear solver also when that is tightened.
 
-        A relative remainder changes the decrease of the merit by its square, hence the tightest one worth asking for.
+        Steps that heavy damping kept short say little, so more of them are waited for where no certificate is asked for
+        that sees through them. A relative remainder changes the decrease of the merit by its square, hence the tightest
+        one worth asking for.
         """
         if self.standing.is_flat(settings):
             return replace(self, suspicion=Status.GRADIENT_TOLERANCE)
-        if len(self.falls) < settings.patience or sum(self.falls) >= settings.merit_tolerance:
+        heavy = damping > settings.initial_damping and settings.when_settled != "go on"
+        patience = settings.patience * (_PATIENCE_WHEN_DAMPED if heavy else 1)
+        if len(self.falls) < patience or max(self.falls[-patience:]) >= settings.merit_tolerance:
             return self
         if inexact and self.accuracy > tightest_accuracy(settings):
             return replace(self, accuracy=max(0.1 * self.accuracy, tightest_accuracy(settings)), falls=())

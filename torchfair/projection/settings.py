@@ -25,9 +25,9 @@ class ProjectionSettings:
             Jacobian, is below this.
         step_tolerance: Stop when a step is below this, relative to the size of the unknowns, both weighted by
             stiffness; or when the merit is below what a change of the unknowns by this fraction makes of it.
-        merit_tolerance: Stop when the last ``patience`` accepted steps together lowered the merit by less than this
+        merit_tolerance: Stop when each of the last ``patience`` accepted steps lowered the merit by less than this
             fraction.
-        patience: See ``merit_tolerance``.
+        patience: See ``merit_tolerance``. Four times as many where the damping is above its start, unless runs go on.
         when_settled: What happens when one of these tests is met. ``"go on"`` ends the run only at a minimum, where an
             undamped step promises no fall of the merit by more than ``merit_tolerance``; ``"judge"`` ends it and says
             whether it is one; ``"stop"`` ends it without asking, as stages do that others follow.
