@@ -220,3 +220,17 @@ def test_planes_that_cut_opposite_sectors_alike_come_first_then_those_with_the_s
     assert [ranks[key] for key in keys] == uneven(crossed, valence).tolist()
     assert sorted(ranks, key=ranks.__getitem__) == sorted(ranks)
     assert len(set(ranks.values())) == len(ranks)
+
+
+@pytest.mark.parametrize("valence", [6, 8, 9, 10, 12])
+def test_planes_of_saddles_show_them_also_where_edges_lie_in_common_planes(valence: int) -> None:
+    """Regular stars of three heights only: many planes through two edges contain others too."""
+    angles = np.arange(valence) * 2 * math.pi / valence
+    heights = np.random.default_rng(0).integers(-1, 2, (150, valence))
+    flat = np.broadcast_to(np.stack([np.cos(angles), np.sin(angles)], axis=1), (150, valence, 2))
+    arms = np.concatenate([flat, heights[..., None]], axis=2)
+    classes = classify_stars(*stars_of(arms))
+    saddles = np.flatnonzero(classes.kinds[:: valence + 1].numpy() == SADDLE)
+    assert 50 < len(saddles) < 150
+    for star in saddles.tolist():
+        assert has_witness(arms[star], classes.normals[(valence + 1) * star][None].numpy())
