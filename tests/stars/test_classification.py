@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 from geometry_meshes import DEGENERATE, icosphere, random_polytope, torus
-from helpers import DOUBLE, cube, tetrahedron, wavy_grid
+from helpers import DOUBLE, cube, random_rotation, tetrahedron, wavy_grid
 from star_tools import Star, directions, has_witness, random_arms, star_of, stars_of
 
 from torchfair import ShapeError, Topology
@@ -224,13 +224,18 @@ def test_planes_that_cut_opposite_sectors_alike_come_first_then_those_with_the_s
 
 @pytest.mark.parametrize("valence", [6, 8, 9, 10, 12])
 def test_planes_of_saddles_show_them_also_where_edges_lie_in_common_planes(valence: int) -> None:
-    """Regular stars of three heights only: many planes through two edges contain others too."""
+    """Regular stars of three heights only: many planes through two edges contain others too.
+
+    Where two faces lie in one plane, every plane cuts them in opposite directions, which rounding must not judge.
+    """
     angles = np.arange(valence) * 2 * math.pi / valence
-    heights = np.random.default_rng(0).integers(-1, 2, (150, valence))
-    flat = np.broadcast_to(np.stack([np.cos(angles), np.sin(angles)], axis=1), (150, valence, 2))
+    heights = np.random.default_rng(0).integers(-1, 2, (100, valence))
+    flat = np.broadcast_to(np.stack([np.cos(angles), np.sin(angles)], axis=1), (100, valence, 2))
     arms = np.concatenate([flat, heights[..., None]], axis=2)
     classes = classify_stars(*stars_of(arms))
     saddles = np.flatnonzero(classes.kinds[:: valence + 1].numpy() == SADDLE)
-    assert 50 < len(saddles) < 150
+    assert 30 < len(saddles) < 95
     for star in saddles.tolist():
-        assert has_witness(arms[star], classes.normals[(valence + 1) * star][None].numpy())
+        assert has_witness(arms[star], classes.normals[(valence + 1) * star][None].numpy(), rounding=1e-12)
+    vertices, topology = stars_of(arms)
+    assert torch.equal(classify_stars(vertices @ random_rotation(3).T, topology).kinds, classes.kinds)
