@@ -48,6 +48,20 @@ def test_patches_are_exact_on_quadratic_height_fields(seed: int) -> None:
     torch.testing.assert_close((jets.weights @ heights[:, :, None])[:, :, 0], jets.slopes, atol=1e-12, rtol=0)
 
 
+@pytest.mark.parametrize("triangles", [False, True])
+def test_patches_know_all_vertices_that_are_at_most_two_edges_away(triangles: bool) -> None:
+    vertices, topology = wavy_grid(6, 5, triangles=triangles)
+    rim = torch.nonzero(topology.is_boundary_vertex).squeeze(1)
+    across = torch.eye(3, dtype=torch.float64)[:2, None].expand(2, rim.numel(), 3).unbind(0)
+    jets = BoundaryJets.of(vertices, topology, rim, UP.expand(rim.numel(), 3), across)
+    near: list[set[int]] = [set() for _ in range(topology.num_vertices)]
+    for v, w in topology.edges.tolist():
+        near[v].add(w)
+        near[w].add(v)
+    for row in jets.stencil.tolist():
+        assert set(row) == {row[0]} | near[row[0]] | set().union(*(near[w] for w in near[row[0]]))
+
+
 def test_patches_turn_and_scale_with_the_mesh() -> None:
     vertices, gradients = random_graph(0)
     turn, _ = torch.linalg.qr(torch.randn(3, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(1)))

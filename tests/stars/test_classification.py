@@ -15,6 +15,7 @@ from star_tools import Star, directions, has_witness, random_arms, star_of, star
 from torchfair import ShapeError, Topology
 from torchfair.geometry import angle_defects
 from torchfair.stars import StarKind, classify_stars
+from torchfair.stars._groups import rounding_angle, sector_normals
 from torchfair.stars._patterns import four_run_patterns, uneven
 
 CONVEX, SADDLE, NEITHER, EXCLUDED = map(int, StarKind)
@@ -239,3 +240,32 @@ def test_planes_of_saddles_show_them_also_where_edges_lie_in_common_planes(valen
         assert has_witness(arms[star], classes.normals[(valence + 1) * star][None].numpy(), rounding=1e-12)
     vertices, topology = stars_of(arms)
     assert torch.equal(classify_stars(vertices @ random_rotation(3).T, topology).kinds, classes.kinds)
+
+
+def test_edges_in_a_plane_are_on_no_side_of_it() -> None:
+    """A roof whose ridge runs along x, and a flat star, seen in the planes orthogonal to their vertex normals."""
+    roof = classify_stars(*star_of([(1, 0, 0), (0, 1, -1), (-1, 0, 0), (0, -1, -1)]))
+    assert roof.ordinary_sides[:4].tolist() == [0, -1, 0, -1]
+    assert roof.pattern(0, ordinary=True) == (2,)
+    flat = classify_stars(*hexagonal(*[0.0] * 6))
+    assert not bool(flat.ordinary_sides.any())
+    assert not bool(flat.sides.any())
+    assert flat.pattern(0) == flat.pattern(0, ordinary=True) == ()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rounding_turns_planes_of_sectors_by_no_more_than_its_bound(seed: int) -> None:
+    """Also where a short arm beside a long one makes a thin sector: ends and centre are wrong by their last digit."""
+    random = np.random.default_rng(seed)
+    arms = random_arms(200, 6, seed, height=0.5)
+    arms[:, 1] = 1e-3 * (arms[:, 2] + 1e-2 * random.normal(size=(200, 3)))
+    arms = torch.from_numpy(arms)
+    scale, eps = torch.full((200,), 30.0, dtype=DOUBLE), 1e-11
+    bound = rounding_angle(arms, scale, eps)
+    assert float(bound.median()) < 1e-2
+    for _ in range(20):
+        shifts = eps * 30.0 * torch.from_numpy(random.uniform(-1, 1, (2, 200, 6, 3)))
+        before, after = sector_normals(arms), sector_normals(arms + shifts[0] - shifts[1][:, :1])
+        turned = torch.linalg.cross(before, after).norm(dim=-1).amax(1)
+        assert bool((turned <= bound).all())
+    assert float((turned / bound).max()) > 0.02  # which is not much too large
