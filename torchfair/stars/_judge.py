@@ -79,13 +79,14 @@ def _convex(arms: Tensor, sectors: Tensor, noise: Tensor) -> tuple[Tensor, Tenso
     heights = sectors @ arms.transpose(1, 2)
     below = (heights <= noise[:, None, None]).flatten(1).all(1)
     above = (heights >= -noise[:, None, None]).flatten(1).all(1)
-    # The apex of a convex cone lies above the mean of its arms; a flat star has no such side.
+    # The apex of a convex cone lies above the mean of its arms; a flat star has no such side, or by rounding only.
     side = torch.where(above, 1.0, -1.0).to(arms)[:, None] * arms.sum(1)
     convex = torch.zeros_like(below)
     normals = torch.zeros_like(side)
     for trial in (sectors.sum(1), side):
-        trial = trial / torch.linalg.vector_norm(trial, dim=-1, keepdim=True)
-        seen = dot(sectors, trial[:, None]).amin(-1) > noise
+        size = torch.linalg.vector_norm(trial, dim=-1, keepdim=True)
+        trial = trial / size
+        seen = (dot(sectors, trial[:, None]).amin(-1) > noise) & (size[:, 0] > arms.shape[1] * noise)
         fits = (below | above) & seen & turns_once(arms, trial)
         convex, normals = convex | fits, torch.where(fits[:, None], trial, normals)
     return convex, normals
