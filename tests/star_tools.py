@@ -54,10 +54,11 @@ def directions(count: int) -> np.ndarray:
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
 
 
-def has_witness(arms: np.ndarray, normals: np.ndarray) -> bool:
+def has_witness(arms: np.ndarray, normals: np.ndarray, *, rounding: float = 0.0) -> bool:
     """Whether one of the planes with normals ``(m, 3)`` shows a star ``(k, 3)`` to be a saddle, by the definition.
 
-    Works in the planes: the star is projected, and the directions of the segments are measured as angles.
+    Works in the planes: the star is projected, and the directions of the segments are measured as angles. Segments
+    are in a half-plane if they leave a gap of half a turn, and ``rounding``.
     """
     following = np.roll(arms, -1, axis=0)
     admissible = normals[(normals @ np.cross(arms, following).T > 0).all(1)]
@@ -76,7 +77,7 @@ def has_witness(arms: np.ndarray, normals: np.ndarray) -> bool:
     segments = ((1 - t) * arms[sector] + t * following[sector]).reshape(-1, 4, 3)
     turns = np.sort(_angles(segments, planes), axis=1)
     gaps = np.diff(np.concatenate([turns, turns[:, :1] + 2 * math.pi], axis=1), axis=1)
-    return bool((one_to_one & (gaps.max(1) < math.pi)).any())
+    return bool((one_to_one & (gaps.max(1) < math.pi + rounding)).any())
 
 
 def _angles(points: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -48,6 +48,20 @@ def test_patches_are_exact_on_quadratic_height_fields(seed: int) -> None:
     torch.testing.assert_close((jets.weights @ heights[:, :, None])[:, :, 0], jets.slopes, atol=1e-12, rtol=0)
 
 
+@pytest.mark.parametrize("triangles", [False, True])
+def test_patches_know_all_vertices_that_are_at_most_two_edges_away(triangles: bool) -> None:
+    vertices, topology = wavy_grid(6, 5, triangles=triangles)
+    rim = torch.nonzero(topology.is_boundary_vertex).squeeze(1)
+    across = torch.eye(3, dtype=torch.float64)[:2, None].expand(2, rim.numel(), 3).unbind(0)
+    jets = BoundaryJets.of(vertices, topology, rim, UP.expand(rim.numel(), 3), across)
+    near: list[set[int]] = [set() for _ in range(topology.num_vertices)]
+    for v, w in topology.edges.tolist():
+        near[v].add(w)
+        near[w].add(v)
+    for row in jets.stencil.tolist():
+        assert set(row) == {row[0]} | near[row[0]] | set().union(*(near[w] for w in near[row[0]]))
+
+
 def test_patches_turn_and_scale_with_the_mesh() -> None:
     vertices, gradients = random_graph(0)
     turn, _ = torch.linalg.qr(torch.randn(3, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(1)))
@@ -133,23 +147,23 @@ def test_normals_that_nearly_oppose_each_other_have_no_plane_between_them(apart:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_share_of_the_way_inwards_is_a_quotient_of_distances_from_the_boundary(seed: int) -> None:
-    """On a flat mesh with a straight side: of the centroid of a star and the mean of its neighbours inside."""
+    """In the plane: of the centroid of a star and the mean of its neighbours inside, orthogonal to the chord."""
     vertices, topology = wavy_grid(6, 5, triangles=True, seed=seed)
-    on_side = (torch.arange(6) * 5)[1:-1]  # x = 0 ... 5 along y = 0, corners left out
+    side = (torch.arange(6) * 5).tolist()  # along y = 0
     flat = vertices * torch.tensor([2.5, 1.5, 0.0], dtype=torch.float64)
-    flat[torch.arange(6) * 5, 1] = 0.0
-    turn = random_rotation(seed)
-    shares = BoundaryNormals.of(flat @ turn.T + 3.0, topology).share
+    shares = BoundaryNormals.of(flat @ random_rotation(seed).T + 3.0, topology).share
     triangles = flat[topology.triangles][..., :2]
     (a, b, c) = triangles.unbind(1)
     areas = 0.5 * torch.linalg.det(torch.stack([b - a, c - a], 1)).abs()
-    for vertex in on_side.tolist():
+    for before, vertex, after in zip(side, side[1:], side[2:], strict=False):
+        chord = flat[after] - flat[before]
+        inwards = torch.stack([-chord[1], chord[0]])
         around = (topology.triangles == vertex).any(1)
-        centroid = float((areas * triangles.mean(1)[:, 1])[around].sum() / areas[around].sum())
+        centroid = (areas[around, None] * triangles.mean(1)[around]).sum(0) / areas[around].sum()
         ends = topology.edges[(topology.edges == vertex).any(1)].flatten().unique()
         inner = [w for w in ends.tolist() if w != vertex and not topology.is_boundary_vertex[w]]
-        expected = min(max(centroid / float(flat[inner, 1].mean()), 0.0), 0.8)
-        assert float(shares[vertex]) == pytest.approx(expected)
+        ways = [float((place - flat[vertex, :2]) @ inwards) for place in (centroid, flat[inner, :2].mean(0))]
+        assert float(shares[vertex]) == pytest.approx(min(max(ways[0] / ways[1], 0.0), 0.8))
 
 
 def test_a_surface_that_meets_its_planes_has_no_bending_there() -> None:

@@ -54,10 +54,11 @@ def test_refreshed_terms_cannot_go_along_directions() -> None:
 
 def test_frames_are_orthonormal() -> None:
     normals = torch.randn(200, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
-    normals = torch.cat([normals, torch.eye(3, dtype=torch.float64)])
+    axes = torch.eye(3, dtype=torch.float64)
+    normals = torch.cat([normals, axes, -axes])
     normals = normals / normals.norm(dim=1, keepdim=True)
     frames = torch.stack([*tangent_frames(normals), normals], 1)
-    torch.testing.assert_close(frames @ frames.mT, torch.eye(3, dtype=torch.float64).expand(203, 3, 3))
+    torch.testing.assert_close(frames @ frames.mT, torch.eye(3, dtype=torch.float64).expand(206, 3, 3))
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.1, 0.5])

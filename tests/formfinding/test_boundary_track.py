@@ -100,3 +100,13 @@ def test_prescribed_normals_of_new_vertices_are_unit_means_of_both_ends() -> Non
     expected = torch.zeros_like(finer[coarse.num_vertices :])
     expected[coarse.num_interior_edges + between] = torch.tensor([0.0, 0.0, 1.0], dtype=DOUBLE)
     torch.testing.assert_close(finer[coarse.num_vertices :], expected)
+
+
+def test_finer_levels_start_nearby_and_need_the_last_smoothing_only() -> None:
+    """Along normals and in space, once each; from afar there is a stage for every smoothing besides."""
+    curve = wave()
+    vertices, topology = start_surface([curve], 40)
+    settings = FormSettings(projection=FEW)
+    result = minimise_absolute_curvature(vertices, topology, curves=[curve], levels=2, settings=settings)
+    assert result.levels.count(0) > 2
+    assert result.levels[result.levels.count(0) :] == [1, 1, 2, 2]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import torch
 from helpers import DOUBLE, grid_faces, split_quads
@@ -11,6 +13,7 @@ from torchfair import MeshError, Topology
 from torchfair.energies import normal_variation
 from torchfair.formfinding import FairSettings, minimise_normal_variation
 from torchfair.formfinding.fair_problem import FairProblem
+from torchfair.geometry import corner_angles
 
 
 def bent_sheet(n: int = 5) -> tuple[Tensor, Topology]:
@@ -97,6 +100,45 @@ def test_a_single_face_without_area_is_refused() -> None:
     topology = Topology.from_faces([[0, 1, 2], [1, 0, 3]])
     with pytest.raises(MeshError, match=r"1 face\(s\) have no area: faces \[1\]"):
         minimise_normal_variation(vertices, topology)
+
+
+def test_handles_do_not_glide() -> None:
+    vertices, topology = bent_sheet()
+    targets = {2: vertices[2] + torch.tensor([-0.3, 0.0, 0.1], dtype=DOUBLE)}
+    gliding = []
+    for fair in (problem(), problem(targets=targets)):
+        (term,) = (term for term in fair.terms(1.0) if term.name == "boundary gliding")
+        gliding.append(set(term.stencil[0][1][:, 0].tolist()))
+    corners = {0, 4, 20, 24}
+    assert gliding[0] == set(torch.nonzero(topology.is_boundary_vertex).squeeze(1).tolist()) - corners
+    assert gliding[1] == gliding[0] - {2}
+
+
+def test_normals_of_faces_that_are_kept_planar_are_orthogonal_to_all_their_edges() -> None:
+    """In the paper's own variables; those of other polygons are tied to their area vectors."""
+    vertices, _ = bent_sheet()
+    topology = Topology.from_faces(grid_faces(5, 5))
+    counts = {}
+    for planar in ("none", "quads", (0, 5, 9)):
+        settings = FairSettings(formulation="lifted", planar=planar)
+        terms = FairProblem(vertices, topology, None, {}, settings).terms(1.0)
+        counts[planar] = [term.num_elements for term in terms if term.name == "face normals"]
+    assert counts == {"none": [16], "quads": [4 * 16], (0, 5, 9): [4 * 3, 13]}
+
+
+@pytest.mark.parametrize("squeeze", [1.0, 0.3, 0.1])
+def test_barriers_of_angles_leave_every_angle_room(squeeze: float) -> None:
+    """Silent from where an angle starts, or from 25 degrees or twice the bound on, but never nearer than 2 degrees."""
+    vertices, topology = bent_sheet()
+    vertices = vertices * torch.tensor([1.0, squeeze, 1.0], dtype=DOUBLE)
+    angles = corner_angles(vertices, topology)
+    fair = FairProblem(vertices, topology, None, {}, FairSettings())
+    (term,) = (term for term in fair.terms(1.0) if term.name == "corner angles")
+    bound = min(math.radians(10.0), float(angles.min()))
+    most = max(math.radians(25.0), 2.0 * bound)
+    expected = angles.clamp(max=most).clamp(min=bound + math.radians(2.0))
+    torch.testing.assert_close(term.data[0], expected)
+    assert bool((term.values(term.arguments({"vertices": vertices})) <= 10.0 + 1e-6).all())
 
 
 def test_energy_stays_at_most_that_of_the_start_even_where_fairness_would_raise_it() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -15,7 +16,7 @@ from torchfair.formfinding import FormSettings, start_surface
 from torchfair.formfinding.boundary_track import BoundaryTrack
 from torchfair.formfinding.form_problem import FormProblem, staying_vertices
 from torchfair.formfinding.form_report import form_measures
-from torchfair.geometry import corner_angles, vertex_normals
+from torchfair.geometry import corner_angles, edge_lengths, vertex_normals
 from torchfair.normalisation import Normalisation
 
 VERTICES, TOPOLOGY = wavy_grid(8, 7, triangles=True)
@@ -81,8 +82,10 @@ def test_the_first_row_inside_prescribed_tangent_planes_stays_while_others_are_s
     assert torch.equal(held, RIM | near)
     assert bool((near & ~RIM).any())
     assert torch.equal(problem().fixed_in_space, RIM)
-    lifted = FormSettings(formulation="lifted")
-    assert torch.equal(problem(normals=upright(some), settings=lifted).fixed_in_space, RIM)
+    for other in (FormSettings(formulation="lifted"), FormSettings(boundary="glide")):
+        also = problem(normals=upright(some), settings=other)
+        assert not also.keeps_rows
+        assert torch.equal(also.fixed_in_space, also.fixed)
 
 
 def test_gliding_boundaries_keep_their_corners() -> None:
@@ -108,6 +111,17 @@ def test_collapse_is_an_angle_below_the_limit_and_below_half_of_the_start() -> N
         least = min(math.radians(5.0), 0.5 * angle)
         assert judge.least_angle(start) == pytest.approx(least)
         assert [judge.has_collapsed(mesh, start) for mesh in squeezed] == [other < least for other in smallest]
+
+
+@pytest.mark.parametrize("coarse", [0.05, 0.1, 0.3, 2.0, 40.0])
+def test_smoothings_fall_in_equal_steps_of_about_five(coarse: float) -> None:
+    found = FormSettings(coarse_smoothing=coarse, smoothing=0.05).smoothings()
+    assert found[0] == pytest.approx(coarse)
+    assert found[-1] == 0.05
+    steps = [a / b for a, b in itertools.pairwise(found)]
+    assert steps == pytest.approx([steps[0]] * len(steps))
+    assert steps[0] < 5.0**1.5
+    assert len(steps) == 1 or steps[0] > 5.0**0.75
 
 
 # ---- what is reported --------------------------------------------------------------------------------------
@@ -154,3 +168,15 @@ def test_start_disks_have_a_boundary_vertex_for_every_corner() -> None:
     vertices, topology = start_surface([curve], 7)
     assert int(topology.is_boundary_vertex.sum()) == 12
     assert float(torch.cdist(places, vertices[topology.is_boundary_vertex]).min(1).values.max()) < 1e-9
+
+
+@pytest.mark.parametrize("count", [300, 2000])
+def test_start_annuli_have_the_number_of_vertices_and_even_triangles(count: int) -> None:
+    """Between circles of a tube all triangles are alike."""
+    lower = circle()
+    upper = ClosedCurve(lower.at(lower.knots) + torch.tensor([0.0, 0.0, 2.0], dtype=DOUBLE))
+    vertices, topology = start_surface([lower, upper], count)
+    assert topology.num_vertices == pytest.approx(count, rel=0.1)
+    lengths = edge_lengths(vertices, topology)
+    level = (vertices[topology.edges][..., 2].diff(dim=1).abs() < 1e-9).squeeze(1)
+    assert float(lengths[level].mean() / lengths[~level].mean()) == pytest.approx(1.0, abs=0.08)

@@ -247,6 +247,7 @@ def test_dtype_is_kept_and_input_untouched() -> None:
     copy = single.clone()
     result = minimise_normal_variation(single, topology)
     assert result.vertices.dtype == torch.float32
+    assert result.projection.blocks["vertices"].dtype == DOUBLE  # what is computed with
     assert torch.equal(single, copy)
 
 

@@ -13,7 +13,7 @@ from torchfair.constraints.principal_symmetric import star_stencil, unevenness
 from torchfair.formfinding import SymmetricDesign, SymmetricSettings, principal_symmetric, strip_normals
 from torchfair.formfinding.symmetric_report import condition_residuals
 from torchfair.geometry import vertex_normals
-from torchfair.principal import PrincipalEdges, developable_strips, principal_edges_of_lattice
+from torchfair.principal import PrincipalEdges, developable_strips, principal_edges_of_lattice, star_spheres
 from torchfair.projection.result import IterationRecord
 from torchfair.shapes import Catenoid, Cylinder, Enneper, Paraboloid, Torus, principal_triangles
 from torchfair.shapes.principal_triangles import parameter_triangles
@@ -309,6 +309,17 @@ def test_refusals() -> None:
     for wrong in ({"boundary": "glide"}, {"formulation": "other"}, {"fairness_weight": -1.0}, {"most_steps": 0}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             SymmetricSettings(**wrong)  # type: ignore[arg-type]
+
+
+def test_normals_at_stars_are_those_of_their_spheres() -> None:
+    """Whatever principal edges along the boundary ask of the normals at their ends."""
+    vertices, edges = start("enneper")
+    noise = torch.randn(vertices.shape, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
+    moved = vertices + 0.01 * noise
+    stars = edges.stars()
+    normals = strip_normals(moved, edges)
+    torch.testing.assert_close(normals[stars.vertices], star_spheres(moved, stars).normals, rtol=0, atol=1e-12)
+    torch.testing.assert_close(normals.norm(dim=1), torch.ones(len(normals), dtype=DOUBLE))
 
 
 def test_normals_of_float32_meshes_keep_their_dtype() -> None:

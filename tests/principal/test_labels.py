@@ -101,6 +101,8 @@ def test_a_hole_can_hide_what_exchanges_the_families() -> None:
     topology = cone(5, 5, apex=False)
     with pytest.raises(MeshError, match=r"around a handle or a hole\. It breaks at edges"):
         principal_edges_from_seed(topology, 3)
+    with pytest.raises(MeshError, match=r"around a handle or a hole\. It breaks at edges"):  # one seed, named twice
+        principal_edges_from_seed(topology, torch.tensor([3, 3]))
     edges = principal_edges_from_seed(topology, 3, allow_exceptions=True)
     assert edges.singular.numel() == 0
     assert edges.exceptions.numel() > 0

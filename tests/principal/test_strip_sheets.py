@@ -79,6 +79,17 @@ def test_overlaps_against_slow_clipping(seed: int) -> None:
     assert sorted(map(tuple, overlaps(flat).tolist())) == slow
 
 
+def test_quads_with_one_other_between_them_can_overlap() -> None:
+    """Three quads that turn by 150 degrees each around a point: the last lies over the first."""
+    turn = np.exp(-1j * np.radians([0.0, 150.0, 300.0, 450.0]))
+    points = np.stack([0.5 * turn, turn], axis=1)
+    flat = np.stack([points.real, points.imag], axis=2)
+    first, _, last = quads_of(flat)
+    assert common_area(first, last) > 0.01
+    assert overlaps(flat).tolist() == [[0, 2]]
+    assert pieces(flat) == [0, 2, 3]
+
+
 def test_some_of_these_walks_overlap_and_some_do_not() -> None:
     assert {bool(len(overlaps(walk(seed)))) for seed in range(12)} == {False, True}
 

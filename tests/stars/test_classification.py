@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 import torch
 from geometry_meshes import DEGENERATE, icosphere, random_polytope, torus
-from helpers import DOUBLE, cube, tetrahedron, wavy_grid
+from helpers import DOUBLE, cube, random_rotation, tetrahedron, wavy_grid
 from star_tools import Star, directions, has_witness, random_arms, star_of, stars_of
 
 from torchfair import ShapeError, Topology
 from torchfair.geometry import angle_defects
 from torchfair.stars import StarKind, classify_stars
+from torchfair.stars._groups import rounding_angle, sector_normals
 from torchfair.stars._patterns import four_run_patterns, uneven
 
 CONVEX, SADDLE, NEITHER, EXCLUDED = map(int, StarKind)
@@ -220,3 +221,55 @@ def test_planes_that_cut_opposite_sectors_alike_come_first_then_those_with_the_s
     assert [ranks[key] for key in keys] == uneven(crossed, valence).tolist()
     assert sorted(ranks, key=ranks.__getitem__) == sorted(ranks)
     assert len(set(ranks.values())) == len(ranks)
+
+
+@pytest.mark.parametrize("valence", [6, 8, 9, 10, 12])
+def test_planes_of_saddles_show_them_also_where_edges_lie_in_common_planes(valence: int) -> None:
+    """Regular stars of three heights only: many planes through two edges contain others too.
+
+    Where two faces lie in one plane, every plane cuts them in opposite directions, which rounding must not judge.
+    """
+    angles = np.arange(valence) * 2 * math.pi / valence
+    heights = np.random.default_rng(0).integers(-1, 2, (100, valence))
+    flat = np.broadcast_to(np.stack([np.cos(angles), np.sin(angles)], axis=1), (100, valence, 2))
+    arms = np.concatenate([flat, heights[..., None]], axis=2)
+    classes = classify_stars(*stars_of(arms))
+    saddles = np.flatnonzero(classes.kinds[:: valence + 1].numpy() == SADDLE)
+    assert 30 < len(saddles) < 95
+    for star in saddles.tolist():
+        assert has_witness(arms[star], classes.normals[(valence + 1) * star][None].numpy(), rounding=1e-12)
+    vertices, topology = stars_of(arms)
+    assert torch.equal(classify_stars(vertices @ random_rotation(3).T, topology).kinds, classes.kinds)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_edges_in_a_plane_are_on_no_side_of_it(seed: int) -> None:
+    """A roof whose ridge runs along x, and a flat star, turned so that rounding leaves nothing exactly in a plane."""
+    turn = random_rotation(seed).T
+    roof, topology = star_of([(1, 0, 0), (0, 1, -1), (-1, 0, 0), (0, -1, -1)])
+    classes = classify_stars(roof @ turn, topology)
+    assert classes.ordinary_sides[:4].tolist() == [0, -1, 0, -1]
+    assert classes.pattern(0, ordinary=True) == (2,)
+    flat, topology = hexagonal(*[0.0] * 6)
+    classes = classify_stars(flat @ turn, topology)
+    assert not bool(classes.ordinary_sides.any())
+    assert not bool(classes.sides.any())
+    assert classes.pattern(0) == classes.pattern(0, ordinary=True) == ()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rounding_turns_planes_of_sectors_by_no_more_than_its_bound(seed: int) -> None:
+    """Also where a short arm beside a long one makes a thin sector: ends and centre are wrong by their last digit."""
+    random = np.random.default_rng(seed)
+    arms = random_arms(200, 6, seed, height=0.5)
+    arms[:, 1] = 1e-3 * (arms[:, 2] + 1e-2 * random.normal(size=(200, 3)))
+    arms = torch.from_numpy(arms)
+    scale, eps = torch.full((200,), 30.0, dtype=DOUBLE), 1e-11
+    bound = rounding_angle(arms, scale, eps)
+    assert float(bound.median()) < 1e-2
+    for _ in range(20):
+        shifts = eps * 30.0 * torch.from_numpy(random.uniform(-1, 1, (2, 200, 6, 3)))
+        before, after = sector_normals(arms), sector_normals(arms + shifts[0] - shifts[1][:, :1])
+        turned = torch.linalg.cross(before, after).norm(dim=-1).amax(1)
+        assert bool((turned <= bound).all())
+    assert float((turned / bound).max()) > 0.02  # which is not much too large

@@ -62,6 +62,16 @@ def test_long_arcs_are_found_wherever_they_cross(valence: int) -> None:
         assert overlaps.within_pyramids == int(pyramid_self_intersections(vertices, topology).sum()) > 0
 
 
+def test_open_stars_at_the_boundary_have_crossings_but_no_pyramid() -> None:
+    vertices, closed = stars_of(random_arms(30, 9, 5, height=1.0))
+    opened = Topology.from_faces([face for number, face in enumerate(closed.face_lists()) if number % 9])
+    assert bool(opened.is_boundary_vertex.all())
+    overlaps = gauss_overlaps(vertices, opened)
+    assert overlaps.crossings == all_pairs(vertices, opened) > 0
+    assert overlaps.within_pyramids == 0
+    assert gauss_overlaps(vertices, closed).within_pyramids > 0
+
+
 def test_convex_surfaces_have_none_and_a_torus_some_between_stars() -> None:
     for mesh in (icosphere(2), random_polytope(1, 40)):
         assert gauss_overlaps(*mesh) == (0, 0)

@@ -132,6 +132,14 @@ def test_modules_equal_functions_on_batches(module: type[PyramidPenalty | Saddle
     assert one(vertices.to(torch.float32)).dtype == torch.float32
 
 
+def test_the_module_keeps_its_choice_of_saddles() -> None:
+    vertices, topology = stars_of(random_arms(20, 6, 2, height=0.3, saddle=0.1))
+    chosen = ~topology.is_boundary_vertex & (torch.arange(140) < 50)
+    some, every = SaddlePenalty(topology, chosen)(vertices), SaddlePenalty(topology)(vertices)
+    torch.testing.assert_close(some, saddle_penalty(vertices, topology, chosen))
+    assert 0 < float(some) < float(every)
+
+
 def test_pyramid_penalty_under_vmap_and_compile() -> None:
     vertices, topology = stars_of(random_arms(5, 6, 2, height=0.3, saddle=0.3))
     batch = torch.stack([vertices, 2 * vertices.roll(1, -1)])
@@ -153,6 +161,36 @@ def test_terms_of_guided_projection_have_the_merit_of_the_penalties() -> None:
         torch.testing.assert_close(merit, penalty)  # half the sum of squares, times the weight
     (pyramids,) = pyramid_terms(topology, weight=2.0)
     assert pyramids.values(pyramids.arguments(state)).shape[1] == 6 * 3 / 2  # pairs of arcs that are no neighbours
+
+
+@pytest.mark.parametrize("valence", [3, 4, 5, 7])
+def test_pyramids_of_all_stars_with_four_edges_or_more_have_terms(valence: int) -> None:
+    vertices, topology = stars_of(random_arms(100, valence, 5, height=0.5))
+    terms = pyramid_terms(topology, weight=1.0)
+    assert sum(term.num_elements for term in terms) == (100 if valence > 3 else 0)
+    state = {"vertices": vertices}
+    merit = sum(float(t.contributions(a := t.arguments(state), t.values(a)).sum()) for t in terms)
+    assert merit == pytest.approx(0.5 * float(pyramid_penalty(vertices, topology)))
+    assert (merit > 0) == (valence > 3)
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.1, 0.4])
+def test_planes_of_saddle_terms_are_those_that_edges_miss_least_by_the_margin(margin: float) -> None:
+    vertices, topology = stars_of(random_arms(60, 6, 9, height=0.2, saddle=0.2))
+    (term,) = saddle_terms(vertices, topology, ~topology.is_boundary_vertex, weight=1.0, margin=margin)
+    x, sides, normals = term.arguments({"vertices": vertices})
+    arms = torch.nn.functional.normalize(x[:, 1:] - x[:, :1], dim=-1)
+
+    def missed(planes: Tensor) -> Tensor:
+        planes = torch.nn.functional.normalize(planes, dim=-1)
+        return (margin - sides * (arms @ planes[..., None]).squeeze(-1)).clamp_min(0.0).square().sum(1)
+
+    least = missed(normals)
+    assert int((least > 1e-6).sum()) > 5
+    noise = torch.randn(20, 60, 3, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
+    for size in (1e-3, 1e-2):
+        for turned in normals + size * noise:
+            assert bool((missed(turned) >= least - 1e-9).all())
 
 
 def test_guided_projection_makes_good_saddles_of_bad_stars() -> None:

@@ -79,13 +79,14 @@ def _convex(arms: Tensor, sectors: Tensor, noise: Tensor) -> tuple[Tensor, Tenso
     heights = sectors @ arms.transpose(1, 2)
     below = (heights <= noise[:, None, None]).flatten(1).all(1)
     above = (heights >= -noise[:, None, None]).flatten(1).all(1)
-    # The apex of a convex cone lies above the mean of its arms; a flat star has no such side.
+    # The apex of a convex cone lies above the mean of its arms; a flat star has no such side, or by rounding only.
     side = torch.where(above, 1.0, -1.0).to(arms)[:, None] * arms.sum(1)
     convex = torch.zeros_like(below)
     normals = torch.zeros_like(side)
     for trial in (sectors.sum(1), side):
-        trial = trial / torch.linalg.vector_norm(trial, dim=-1, keepdim=True)
-        seen = dot(sectors, trial[:, None]).amin(-1) > noise
+        size = torch.linalg.vector_norm(trial, dim=-1, keepdim=True)
+        trial = trial / size
+        seen = (dot(sectors, trial[:, None]).amin(-1) > noise) & (size[:, 0] > arms.shape[1] * noise)
         fits = (below | above) & seen & turns_once(arms, trial)
         convex, normals = convex | fits, torch.where(fits[:, None], trial, normals)
     return convex, normals
@@ -134,7 +135,7 @@ def _best_plane(arms: Tensor, sectors: Tensor, signs: Tensor, noise: Tensor) -> 
         at = stars[chosen]
         if not at.numel():
             continue
-        directions, margins = _plane_of_pattern(arms[at], sectors[at], sides[chosen], crossed[chosen])
+        directions, margins = _plane_of_pattern(arms[at], sectors[at], sides[chosen], crossed[chosen], noise[at])
         fits = (margins > noise[at]) & turns_once(arms[at], directions)
         stand_off = torch.where(fits, dot(arms[at], directions[:, None]).abs().amin(1), -1.0)
         best = torch.full_like(noise, -1.0).scatter_reduce(0, at, stand_off, "amax")
@@ -167,12 +168,19 @@ def _each_run_bends(sides: Tensor, signs: Tensor) -> Tensor:
     return kept
 
 
-def _plane_of_pattern(arms: Tensor, sectors: Tensor, sides: Tensor, crossed: Tensor) -> tuple[Tensor, Tensor]:
-    """A plane that has the edges on the given sides and meets the star in no half-plane, if there is one."""
+def _plane_of_pattern(
+    arms: Tensor, sectors: Tensor, sides: Tensor, crossed: Tensor, noise: Tensor
+) -> tuple[Tensor, Tensor]:
+    """A plane that has the edges on the given sides and meets the star in no half-plane, if there is one.
+
+    Where the sectors at both ends of a run lie in one plane, within ``noise``, every plane meets them in opposite
+    directions: they are in no half-plane, but barely, and rounding does not decide.
+    """
     start, stop = _long_runs(crossed, arms.shape[1])
-    turning = cross(_pick(sectors, stop), _pick(sectors, start))
+    first = _pick(sectors, start)
+    turning = cross(_pick(sectors, stop), first)
     size = torch.linalg.vector_norm(turning, dim=-1, keepdim=True)
-    turning = turning / torch.where(size > 0, size, 1.0)
+    turning = torch.where(size > noise[:, None, None], turning / size, first)  # which is a wall anyway
     walls = torch.cat([arms * sides[..., None], turning, sectors], dim=1)
     return interior_directions(_without_idle(walls, sectors))
 

@@ -101,9 +101,10 @@ def classify_stars(vertices: Tensor, topology: Topology) -> StarClasses:
     """Says of every inner vertex whether its star is convex, saddle-shaped or neither (paper section 2.1).
 
     *Saddle-shaped*: some plane through the vertex meets the star in exactly four segments that do not lie in a
-    half-plane, and the star projects onto it 1-1. *Convex*: the star lies on one side of the planes of all its
-    faces and projects 1-1 onto some plane; flat edges and flat stars count as convex. Both tests are exact up
-    to rounding of the coordinates.
+    half-plane, and the star projects onto it 1-1; segments in just opposite directions, which is how every plane meets
+    two faces in one plane, lie in none. *Convex*: the star lies on one side of the planes of all its faces and
+    projects 1-1 onto some plane; flat edges and flat stars count as convex. Both tests are exact up to rounding of
+    the coordinates.
 
     *Inflection face*: its two neighbours in the star lie on different sides of its plane; so the dihedral angles
     at its two edges differ in sign, and flat edges make none. *Good saddle*: a plane as above exists which meets
