@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from .._numbers import check_number
+from .._numbers import check_number, is_number
 from ..errors import SettingsError
 from ..projection import ProjectionSettings
 from .checks import check_choice, check_weights
@@ -80,7 +81,11 @@ class FairSettings:
         check_weights(self)
         if isinstance(self.planar, str) and self.planar not in PLANAR:
             raise SettingsError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
-        if not all(1.0 < factor < math.inf for factor in self.continuation):
+        for name in ("smallest_angle", "smallest_area", "planar_tolerance", "corner_angle"):
+            check_number(name, getattr(self, name))
+        check_number("smoothing", self.smoothing, above=True, finite=True)
+        factors = self.continuation if isinstance(self.continuation, Iterable) else (self.continuation,)
+        if not all(is_number(factor) and 1.0 < factor < math.inf for factor in factors):
             raise SettingsError(f"continuation must hold finite factors above 1, got {self.continuation}")
         if self.distance_limit is not None:
             check_number("distance_limit (or None)", self.distance_limit, above=True)

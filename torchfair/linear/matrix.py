@@ -10,6 +10,7 @@ import scipy.sparse as sp
 import torch
 from torch import Tensor
 
+from .._shown import shown
 from ..errors import ShapeError, SingularSystemError
 from .base import Factor, LinearSolver, System
 from .choose import choose_solver
@@ -61,8 +62,10 @@ class MatrixSystem:
         places.sort_indices()
         where = sp.csc_matrix((np.arange(1, places.nnz + 1), places.indices, places.indptr), (size, size))
         entries = sp.tril(self._matrix, format="coo")
-        positions = np.asarray(where[entries.row, entries.col]).ravel() - 1
-        values = np.bincount(positions, entries.data, places.nnz) if entries.nnz else np.zeros(places.nnz)
+        values = np.zeros(places.nnz)
+        if entries.nnz:  # SciPy answers with a sparse matrix where it is asked for no entry
+            positions = np.asarray(where[entries.row, entries.col]).ravel() - 1
+            values = np.bincount(positions, entries.data, places.nnz)
         triangle = LowerTriangle(places.indptr.astype(np.int64), places.indices.astype(np.int64))
         return triangle, torch.from_numpy(values).to(self.device)
 
@@ -99,7 +102,8 @@ def factorise(matrix: Matrix, damping: Tensor | None = None, *, solver: str | Li
 
     Raises:
         ShapeError: not a square matrix.
-        SingularSystemError: the matrix is singular, indefinite or not finite.
+        SingularSystemError: the matrix is singular, indefinite or not finite. SuperLU (``"scipy"``) and conjugate
+            gradients do not always notice that a matrix is indefinite or barely singular.
 
     Example:
         >>> import scipy.sparse as sp, torch
@@ -107,7 +111,7 @@ def factorise(matrix: Matrix, damping: Tensor | None = None, *, solver: str | Li
         >>> factorise(chain).solve(torch.tensor([1.0, 0.0, 1.0], dtype=torch.float64)).values
         tensor([1., 1., 1.], dtype=torch.float64)
     """
-    system: System = MatrixSystem(matrix) if isinstance(matrix, Tensor) or sp.issparse(matrix) else matrix
+    system: System = matrix if hasattr(matrix, "pattern") else MatrixSystem(matrix)
     chosen = choose_solver(solver, system.pattern) if isinstance(solver, str) else solver
     chosen.prepare(system.pattern)
     if damping is None:
@@ -123,6 +127,8 @@ def _to_scipy(matrix: Matrix) -> Any:
         entries = matrix.detach().cpu().double().to_sparse().coalesce()
         places = tuple(entries.indices().numpy())
         matrix = sp.csr_matrix((entries.values().numpy(), places), (matrix.shape[0], matrix.shape[1]))
+    if not sp.issparse(matrix):
+        raise ShapeError("matrix", expected, shown(matrix))
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.dtype.kind != "f":
         raise ShapeError("matrix", expected, f"{matrix.shape} {matrix.dtype}")
     result = sp.csr_matrix(matrix, dtype=np.float64)

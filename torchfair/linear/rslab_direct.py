@@ -133,6 +133,8 @@ class RslabDirect(SparseDirect):
 
 
 def _substitute(factor: Any, right: np.ndarray) -> np.ndarray:
+    if not right.size:
+        return np.zeros_like(right)
     solve = factor.solve if right.ndim == 1 else factor.solve_many
     solution: np.ndarray = solve(np.ascontiguousarray(right))
     return solution

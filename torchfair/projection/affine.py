@@ -36,7 +36,7 @@ class AffinePart:
     def __init__(self, terms: Sequence[CompiledTerm], layout: Layout, free: Tensor, dtype: torch.dtype) -> None:
         origin = layout.unflatten(torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device))
         self._terms = [compiled.term for compiled in terms]
-        matrices, offsets = [], []
+        matrices, offsets, roots = [], [], []
         for compiled in terms:
             values, jacobians = compiled.term.derivatives(compiled.term.arguments(origin))
             root = compiled.term.roots(values)
@@ -46,9 +46,10 @@ class AffinePart:
             rows = np.repeat(np.arange(n * m), k)
             matrices.append(sp.csr_matrix((entries.ravel(), (rows, columns.ravel())), (n * m, layout.num_unknowns)))
             offsets.append((values * root[:, None]).reshape(-1))
+            roots.append(root.repeat_interleave(m))
         whole = sp.csr_matrix(sp.vstack(matrices))
         whole.eliminate_zeros()
-        self.offset = torch.cat(offsets)
+        self.offset, self._roots = torch.cat(offsets), torch.cat(roots)
         self._sizes = [offset.shape[0] for offset in offsets]
         self._matrix, self._whole = whole, self._to_torch(whole)
         self.jacobian = whole
@@ -79,6 +80,12 @@ class AffinePart:
         """(rows,) by how much a step (N,) changes the scaled residuals."""
         result: Tensor = self._whole @ step
         return result
+
+    def by_term(self, residual: Tensor, squares: Tensor) -> list[tuple[Tensor, Tensor]]:
+        """For each term residuals, and sums of ``A_ij^2`` times ``squares`` (N,), both without weights."""
+        inverse = torch.where(self._roots > 0.0, 1.0 / self._roots, 0.0)
+        changes = self._to_torch(self.jacobian.power(2)) @ squares * inverse.square()
+        return list(zip(torch.split(residual * inverse, self._sizes), torch.split(changes, self._sizes), strict=True))
 
     def misfit(self, state: State, flat: Tensor) -> str | None:
         """Name of a term whose residuals at a state are not those of the linear map: it is not linear."""

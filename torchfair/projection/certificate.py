@@ -10,6 +10,7 @@ from .course import Course, tightest_accuracy
 from .problem import Problem
 from .proposal import Proposal
 from .state import ProjectionState
+from .vanishing import vanishing
 
 _PROBE = 1e-14  # damping, relative to the diagonal: as good as none
 _ROUNDING = 2.0**-52
@@ -21,7 +22,8 @@ def certified(problem: Problem, state: ProjectionState) -> list[bool]:
 
     A small step may be due to heavy damping, a small gradient to the units of the unknowns. The predicted fall of the
     undamped step is free of both: relative to the merit it is the square of the relative offset of Bates and Watts
-    (1981). It must be below ``merit_tolerance`` (or below what ``step_tolerance`` makes of the merit). Where the
+    (1981). It must be below ``merit_tolerance`` (or, where all residuals are zero as far as
+    ``step_tolerance`` tells, below what that makes of the merit). Where the
     Jacobian is nearly singular this cannot be had at true minima either; there the curvature of the merit along the
     undamped step decides, by two more evaluations.
     """
@@ -34,8 +36,13 @@ def certified(problem: Problem, state: ProjectionState) -> list[bool]:
     flat = layout.flatten(state.evaluation.state)
     sizes = layout.member_sums(system.diagonal * flat.square())
     merits = state.evaluation.merits
-    bounds = settings.merit_tolerance * merits + 0.5 * settings.step_tolerance**2 * sizes
-    promises_nothing = proposal.predicted <= bounds
+    # Beside one stiff constraint what step_tolerance makes of the merit may be more than all else is worth. So it
+    # counts only where no term has residuals to speak of; elsewhere rounding is all that may be left.
+    zero = vanishing(system, state.evaluation.state, settings.step_tolerance)
+    finest = min(settings.step_tolerance, 4.0 * torch.finfo(flat.dtype).eps)
+    bounds = settings.merit_tolerance * merits + 0.5 * torch.where(zero, settings.step_tolerance, finest) ** 2 * sizes
+    # The exact solution never promises a rise: if this one does, by more than that, it is too inaccurate to tell.
+    promises_nothing = proposal.predicted.abs() <= bounds
     lengths = (_NEAR * (sizes / layout.member_sums(diagonal * proposal.change.square())).sqrt()).clamp(max=1.0)
     lengths = torch.where(torch.isfinite(lengths), lengths, 1.0)
     curvatures = _curvatures(problem, flat, layout.member_spread(lengths) * proposal.change, merits) / lengths.square()

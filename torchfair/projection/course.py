@@ -30,7 +30,7 @@ class Standing:
     @property
     def is_zero(self) -> bool:
         """Whether all residuals are zero, as far as can be told."""
-        return self.merit <= self.floor
+        return self.merit == 0.0 or self.merit <= self.floor
 
     def is_flat(self, settings: ProjectionSettings) -> bool:
         """Whether there are residuals, but no gradient."""

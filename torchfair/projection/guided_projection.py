@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import torch
 from torch import Tensor
 
+from .._shown import shown
 from .._threads import threads_for
 from ..errors import ShapeError
 from .batch import BatchRun
@@ -105,10 +106,10 @@ class GuidedProjection(Problem):
             TorchfairError: see :func:`guided_projection`.
         """
         settings = ProjectionSettings.given(settings)
-        counts = {block.shape[0] for block in blocks.values()}
-        if len(counts) != 1 or any(block.ndim != 3 for block in blocks.values()):
-            shapes = [tuple(block.shape) for block in blocks.values()]
-            raise ShapeError("blocks", "(batch, n, d) with one batch size", shapes)
+        given = list(blocks.values()) if isinstance(blocks, Mapping) else []
+        counts = {len(block) for block in given if isinstance(block, Tensor) and block.ndim == 3}
+        if len(counts) != 1 or not all(isinstance(block, Tensor) and block.ndim == 3 for block in given):
+            raise ShapeError("blocks", "(batch, n, d) with one batch size", [shown(block) for block in given])
         if counts == {0}:
             return []
         self.check_blocks({name: block[0] for name, block in blocks.items()})

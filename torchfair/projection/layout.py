@@ -90,11 +90,12 @@ class Layout:
 
     def member_sums(self, flat: Tensor) -> Tensor:
         """(members,) sums of a flat vector over the unknowns of each member."""
-        return torch.stack([part.sum(1) for part in self._by_member(flat)]).sum(0)
+        return torch.stack([flat.new_zeros(self.members), *(part.sum(1) for part in self._by_member(flat))]).sum(0)
 
     def member_largest(self, flat: Tensor) -> Tensor:
         """(members,) largest entries."""
-        return torch.stack([part.amax(1) for part in self._by_member(flat) if part.shape[1]]).amax(0)
+        parts = [part.amax(1) for part in self._by_member(flat)]
+        return torch.stack(parts).amax(0) if parts else flat.new_zeros(self.members)
 
     def member_spread(self, values: Tensor) -> Tensor:
         """(N,) the value (members,) of the member that an unknown belongs to."""

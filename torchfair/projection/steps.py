@@ -24,6 +24,7 @@ from .state import Linearised, ProjectionState
 from .stopwatch import Stopwatch
 from .system import Evaluation
 from .trials import Guard, Trials
+from .vanishing import vanishing
 
 _LONGEST_EXTRAPOLATION = 3.0
 _LARGEST_CORRECTION = 0.75  # of the step, in the norm of the damping (Transtrum and Sethna 2012)
@@ -151,6 +152,9 @@ def _linearise(
     sizes = layout.member_sums(diagonal * layout.flatten(evaluation.state).square())
     floors = 0.5 * settings.step_tolerance**2 * sizes
     numbers = torch.stack([evaluation.merits, cosines, floors], 1).tolist()
+    if any(merit <= floor and merit > 0.0 for merit, _, floor in numbers):
+        zero = vanishing(system, evaluation.state, settings.step_tolerance).tolist()
+        numbers = [[*row[:2], row[2] if small else 0.0] for row, small in zip(numbers, zero, strict=True)]
     stiffest = diagonal if stiffness is None else torch.maximum(diagonal, stiffness)
     return Linearised(system, inequalities, stiffest), [Standing(*row) for row in numbers]
 

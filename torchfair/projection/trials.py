@@ -44,6 +44,7 @@ class Trials:
         self._guard, self._watch = guard, watch
         self._start = problem.layout.flatten(state.evaluation.state)
         self._active = [course.finished(state.settings) is None for course in state.courses]
+        self._lost = [False for _ in state.courses]  # members whose step leads nowhere finite, in this attempt
         self._best: Evaluation | None = None
         self._change = torch.zeros_like(self._start)
         self._mixed = False
@@ -59,14 +60,14 @@ class Trials:
             again: The gain of the first attempt stays what counts.
 
         Returns:
-            The state after the step, also where it is not taken; None if it is not finite.
+            The state after the step, also where it is not taken; None if it is finite for no member.
         """
         trial, change, merits, promised = self._finite(change)
         if trial is None:
             return None
         gains, takes = [], []
         for number, course in enumerate(self._state.courses):
-            asked = self._active[number] and (to is None or to[number])
+            asked = self._active[number] and not self._lost[number] and (to is None or to[number])
             fall = course.merit - merits[number]
             gains.append(fall / promised[number] if asked and promised[number] > 0.0 else -math.inf)
             takes.append(gains[number] > LEAST_GAIN and fall > 0.0 and merits[number] < self.merits[number])
@@ -111,6 +112,7 @@ class Trials:
         that they do not stop all others.
         """
         structure, fall = self._problem.structure, self._proposal.predicted
+        self._lost = [False for _ in self._lost]
         for _ in range(_HALVINGS):
             trial = self._evaluate(self._start + change)
             merits, promised = torch.stack([trial.merits, fall]).tolist()
@@ -118,7 +120,15 @@ class Trials:
                 return trial, change, merits, promised
             change = torch.where(structure.unknowns_of_infinite_elements(trial), 0.5 * change, change)
             fall = self._proposal.system.predicted_fall(change)
-        return None, change, [], []
+        self._lost = [not math.isfinite(merit) for merit in merits]
+        if all(self._lost):
+            return None, change, [], []
+        # Those that are nowhere finite stay where they are; they must not stop the other members.
+        stay = torch.tensor(self._lost, device=change.device)
+        change = torch.where(self._problem.layout.member_spread(stay), 0.0, change)
+        trial = self._evaluate(self._start + change)
+        merits, promised = torch.stack([trial.merits, self._proposal.system.predicted_fall(change)]).tolist()
+        return trial, change, merits, promised
 
     def _admits(self, trial: State) -> bool:
         return self._guard is None or self._guard(self._state.evaluation.state, trial)
