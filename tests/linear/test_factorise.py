@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from torch import Tensor
 
 from torchfair import ShapeError
 from torchfair.errors import SettingsError, SingularSystemError
-from torchfair.linear import BlockDense, ConjugateGradients, MatrixSystem, RslabDirect, factorise
+from torchfair.linear import BlockDense, ConjugateGradients, MatrixSystem, RslabDirect, choose_solver, factorise
 
 SOLVERS = ["dense", "scipy", "cg", "auto", *(["rslab"] if RslabDirect.available() else [])]
 
@@ -137,3 +138,37 @@ def test_blocks_are_solved_as_the_whole_matrix_is() -> None:
     torch.testing.assert_close(factor.solve(right[:, 1]).values, expected[:, 1], atol=1e-10, rtol=0)
     with pytest.raises(SingularSystemError, match="2 blocks of the matrix are not positive definite"):
         factorise(matrix, -100.0 * damping, solver=BlockDense(unknowns))
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_solver_that_is_used_again_sees_that_entries_are_elsewhere(solver: str) -> None:
+    """Two patterns with as many entries: couplings (0, 1) and (0, 2)."""
+    matrices = [2.0 * torch.eye(3, dtype=torch.float64) for _ in range(2)]
+    matrices[0][0, 1] = matrices[0][1, 0] = matrices[1][0, 2] = matrices[1][2, 0] = 1.0
+    chosen = choose_solver(solver, MatrixSystem(matrices[0]))
+    right = torch.tensor([1.0, 2.0, 3.0], dtype=torch.float64)
+    for matrix in (*matrices, matrices[0]):
+        values = factorise(matrix, solver=chosen).solve(right, 1e-12).values
+        torch.testing.assert_close(matrix @ values, right, atol=1e-10, rtol=0)
+
+
+@pytest.mark.parametrize(
+    ("size", "device", "rslab", "name"),
+    [
+        (120, "cpu", True, "dense"),
+        (120, "cuda", True, "dense"),
+        (121, "cpu", True, "rslab"),
+        (121, "cpu", False, "scipy"),
+        (121, "cuda", True, "conjugate gradients"),
+        (200_000, "cpu", True, "rslab"),
+        (200_001, "cpu", True, "conjugate gradients"),
+        (30_000, "cpu", False, "scipy"),
+        (30_001, "cpu", False, "conjugate gradients"),
+    ],
+)
+def test_the_choice_follows_size_device_and_what_is_installed(
+    monkeypatch: pytest.MonkeyPatch, size: int, device: str, rslab: bool, name: str
+) -> None:
+    monkeypatch.setattr(RslabDirect, "available", staticmethod(lambda: rslab))
+    pattern = SimpleNamespace(num_unknowns=size, device=torch.device(device))
+    assert choose_solver("auto", pattern).name == name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -13,7 +14,15 @@ from torchfair import ShapeError, Topology
 from torchfair.constraints import closeness_terms, interior_fairness_terms, normal_variation_terms
 from torchfair.constraints.closeness import TangentPlanes
 from torchfair.geometry.closest_point import ReferenceSurface
-from torchfair.projection import ElementTerm, GuidedProjection, OneSided, ProjectionResult, ProjectionSettings, Status
+from torchfair.projection import (
+    ElementTerm,
+    GuidedProjection,
+    OneSided,
+    ProjectionResult,
+    ProjectionSettings,
+    Status,
+    steps,
+)
 
 
 def stretched(x: Tensor) -> Tensor:
@@ -169,3 +178,28 @@ def test_blocks_of_other_shapes_are_refused(shape: tuple[int, ...]) -> None:
 def test_an_empty_batch_has_no_results() -> None:
     problem, starts = net()
     assert problem.solve_batch({"x": starts[:0]}) == []
+
+
+def test_members_that_go_on_without_the_others_take_their_state_along() -> None:
+    """Blocks, stiffness met, and inequalities heeded are those of the same member alone."""
+    problem, starts = net()
+    together = problem.batched(7)
+    state, _ = steps.step(together, steps.init(together, {"x": starts.flatten(0, 1)}))
+    _, smaller = steps.of_members(problem, state, [2, 6])
+    alone = [steps.step(problem, steps.init(problem, {"x": starts[member]}))[0] for member in (2, 6)]
+    assert not torch.equal(alone[0].heeded, alone[1].heeded)
+    assert torch.equal(smaller.heeded, torch.cat([one.heeded for one in alone]))
+    for mine, others in (
+        (smaller.blocks["x"], [one.blocks["x"] for one in alone]),
+        (smaller.linearised.stiffness, [one.linearised.stiffness for one in alone]),
+    ):
+        torch.testing.assert_close(mine, torch.cat(others), atol=1e-9, rtol=0)
+
+
+def test_batches_of_other_terms_are_not_those_of_the_terms_before() -> None:
+    problem, starts = net()
+    settings = ProjectionSettings(max_iterations=3)
+    problem.solve_batch({"x": starts[:2]}, settings=settings)
+    again = problem.with_terms([replace(term, weight=3.0 * term.weight + 1.0) for term in problem.terms])
+    alone = [again.solve({"x": start}, settings=settings) for start in starts[:2]]
+    assert_same(again.solve_batch({"x": starts[:2]}, settings=settings), alone)

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import torch
 from helpers import DOUBLE
 from torch import Tensor
 
 from torchfair.errors import SettingsError
-from torchfair.projection import ElementTerm, ProjectionResult, ProjectionSettings, Status, guided_projection
+from torchfair.projection import (
+    ElementTerm,
+    GuidedProjection,
+    IterationRecord,
+    ProjectionResult,
+    ProjectionSettings,
+    Status,
+    guided_projection,
+    init,
+)
+from torchfair.projection.certificate import certified
+from torchfair.projection.result import message_of
 
 PAIR = [("u", torch.zeros(1, 1, dtype=torch.int64)), ("v", torch.zeros(1, 1, dtype=torch.int64))]
 
@@ -111,6 +124,45 @@ def test_how_far_the_merit_still_fell_is_told() -> None:
     assert guided_projection(unknown(0.0), [quartic]).recent_fall == 0.0
 
 
+@pytest.mark.parametrize(("steps", "fall"), [(0, 0.0), (3, 3 / 100), (10, 10 / 100), (13, 10 / 97)])
+def test_the_last_ten_accepted_steps_count_or_as_many_as_there_were(steps: int, fall: float) -> None:
+    """Merits fall from 100 by one with every accepted step; between them, one is refused."""
+    merits = [100.0, *(100.0 - (number + 1) // 2 for number in range(1, 2 * steps + 1))]
+    history = [
+        IterationRecord(number, merit, 1.0, 1.0, 1.0, 0.1, number % 2 == 1 or number == 0, 1, 0.0)
+        for number, merit in enumerate(merits)
+    ]
+    result = ProjectionResult({}, Status.TIME_LIMIT, "", [], [], history, "dense", {})
+    assert result.recent_fall == pytest.approx(fall)
+    expected = f"merit -{100.0 * fall:.2g} % in the last {min(steps, 10)} steps"
+    assert message_of(Status.TIME_LIMIT, history).endswith(expected)
+
+
 def test_another_choice_is_refused() -> None:
     with pytest.raises(SettingsError, match="when_settled must be 'go on', 'judge' or 'stop'"):
         ProjectionSettings(when_settled="maybe")
+
+
+@pytest.mark.parametrize(("sign", "minimum"), [(1.0, True), (-1.0, False)])
+def test_where_the_jacobian_is_nearly_singular_curvature_decides(sign: float, minimum: bool) -> None:
+    """Of ``(u + v - 2, 1 + sign (u - v)^2 / 2)`` next to u = v = 1: a minimum, or a saddle.
+
+    Along u - v the Jacobian all but vanishes, so that the undamped step promises to do away with the residual 1.
+    """
+    both = ElementTerm(
+        "r",
+        lambda x: torch.stack([x[0, 0] + x[1, 0] - 2.0, 1.0 + 0.5 * sign * (x[0, 0] - x[1, 0]) ** 2]),
+        [("x", torch.tensor([[0, 1]]))],
+    )
+    blocks = {"x": torch.tensor([[1.0 + 1e-6], [1.0 - 1e-6]], dtype=DOUBLE)}
+    problem = GuidedProjection(blocks, [both], solver="dense")
+    assert certified(problem, init(problem, blocks)) == [minimum]
+
+
+def test_an_unknown_that_is_felt_no_more_is_at_a_minimum_only_if_it_never_was() -> None:
+    """Far out on ``exp(-x^2) + 1`` the derivative is zero in numbers, the residual is not."""
+    problem = GuidedProjection(unknown(40.0), [term(lambda x: torch.exp(-(x[0, 0] ** 2)) + 1.0)])
+    state = init(problem, unknown(40.0))
+    assert certified(problem, state) == [True]
+    felt = replace(state.linearised, stiffness=torch.ones(1, dtype=DOUBLE))
+    assert certified(problem, replace(state, linearised=felt)) == [False]

@@ -103,3 +103,19 @@ def test_extrapolation_is_not_tried_where_it_is_hardly_longer_or_not_wanted() ->
     assert one_step(10.0, 2.6) == pytest.approx(-2.6)
     assert one_step(10.0, 2.4, least_extrapolation=1.2) == pytest.approx(-2.4)
     assert one_step(1.0, 1.0, least_extrapolation=math.inf) == pytest.approx(0.0, abs=1e-9)
+
+
+# ---- units of the damping ------------------------------------------------------------------------------------
+
+
+def test_damping_is_in_units_of_the_largest_stiffness_met() -> None:
+    """On x^4 / 2 the stiffness (2 x)^2 falls on the way to 0; steps are damped by that of the start all the same."""
+    quartic = ElementTerm("quartic", lambda x: x[0] ** 2, [("x", torch.zeros(1, 1, dtype=torch.int64))])
+    settings = replace(
+        STEPS, damping_scale="diagonal", initial_damping=0.5, max_iterations=5, least_extrapolation=math.inf
+    )
+    x = 1.0
+    for record in guided_projection(at(x), [quartic], settings=settings).history[1:]:
+        assert record.accepted
+        x -= 2.0 * x**3 / (4.0 * x**2 + 4.0 * record.damping)
+        assert record.merit == pytest.approx(0.5 * x**4)

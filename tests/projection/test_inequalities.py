@@ -14,11 +14,13 @@ from torch import Tensor
 from torchfair import ShapeError
 from torchfair.projection import (
     ElementTerm,
+    GuidedProjection,
     OneSided,
     ProjectionSettings,
     Squares,
     Status,
     guided_projection,
+    init,
 )
 from torchfair.projection.loss import Loss
 
@@ -189,3 +191,36 @@ def test_inequalities_have_no_merit_of_their_own() -> None:
     term = ElementTerm("walls", beyond, [("x", rows)], data=data, loss=OneSided(), merit=broken)
     with pytest.raises(ShapeError, match="walls"):
         guided_projection({"x": torch.zeros(1, 3, dtype=DOUBLE)}, [term])
+
+
+def test_walls_of_several_terms_are_as_good_as_walls_of_one() -> None:
+    """Terms of two, one, three and one wall, so that no other place in the list would do."""
+    generator = torch.Generator().manual_seed(5)
+    normals = torch.randn(7, 3, dtype=DOUBLE, generator=generator)
+    offsets = torch.rand(7, dtype=DOUBLE, generator=generator)
+    target = 3.0 * torch.randn(3, dtype=DOUBLE, generator=generator)
+    blocks, (pull, walls) = corner_problem(normals, offsets, target, 10.0)
+    parts = [torch.tensor(rows) for rows in ([0, 1], [2], [3, 4, 5], [6])]
+    rows = [("x", torch.zeros(7, 1, dtype=torch.int64))]
+    several = [replace(walls, stencil=[("x", rows[0][1][part])], data=(normals[part], offsets[part])) for part in parts]
+    whole, split = (
+        guided_projection(blocks, terms, settings=FREE_STEPS) for terms in ([pull, walls], [pull, *several])
+    )
+    assert [record.inner_iterations for record in split.history] == [r.inner_iterations for r in whole.history]
+    torch.testing.assert_close(split.blocks["x"], whole.blocks["x"], atol=1e-12, rtol=0)
+    assert split.merit == pytest.approx(lowest_by_enumeration(normals, offsets, target, 10.0), rel=1e-8)
+
+
+def test_to_know_what_the_step_before_heeded_saves_linear_solves() -> None:
+    """A wall that holds before the step and is met by it: heeded from the start, the first solution is the step."""
+    normals = torch.tensor([[1.0, 0.0], [0.0, 1.0]], dtype=DOUBLE)
+    blocks, terms = corner_problem(normals, torch.tensor([0.1, 5.0], dtype=DOUBLE), torch.ones(2, dtype=DOUBLE), 100.0)
+    problem = GuidedProjection(blocks, terms, solver="dense")
+    inequalities = init(problem, blocks).linearised.inequalities
+    assert inequalities is not None
+    damping = torch.full((2,), 0.1, dtype=DOUBLE)
+    first = inequalities.propose(problem.solver, damping, None, 1e-12)
+    again = inequalities.propose(problem.solver, damping, first.heeded, 1e-12)
+    assert first.heeded.tolist() == [True, False]
+    assert first.iterations > again.iterations == 1
+    torch.testing.assert_close(again.change, first.change, atol=1e-12, rtol=0)

@@ -101,3 +101,16 @@ def test_a_correction_longer_than_the_step_is_not_trusted() -> None:
     )
     assert not plain.history[1].accepted
     assert not corrected.history[1].accepted
+
+
+@pytest.mark.parametrize(("bend", "end"), [(-0.7, -0.3), (-0.74, -0.26), (-0.76, -1.0), (0.5, -1.0)])
+def test_a_correction_is_taken_if_it_is_moderate_and_better(bend: float, end: float) -> None:
+    """The step of 1 + x + bend x^2 from 0 leads to -1, where the residual is bend: the correction is -bend.
+
+    Above three quarters of the step it is not tried; with 0.5 it lowers the merit, but less than the step alone.
+    """
+    term = ElementTerm("bent", lambda x: 1.0 + x[0] + bend * x[0] ** 2, [("x", torch.zeros(1, 1, dtype=torch.int64))])
+    start = {"x": torch.zeros(1, 1, dtype=DOUBLE)}
+    settings = ProjectionSettings(max_iterations=1, initial_damping=1e-13)
+    result = GuidedProjection(start, [term]).solve(start, settings=settings)
+    assert float(result.blocks["x"]) == pytest.approx(end, abs=1e-9)

@@ -179,3 +179,19 @@ def test_an_own_one_sided_loss_is_heeded_like_ours() -> None:
     known = GuidedProjection(blocks, problem.terms).solve(blocks)
     assert mine.iterations == known.iterations
     assert torch.equal(mine.blocks["x"], known.blocks["x"])
+
+
+def test_the_gain_of_a_shortened_step_is_that_over_what_the_shortened_step_promised() -> None:
+    """The whole step leads to the square root of a negative number, half of it does not; one term is linear."""
+    row = torch.zeros(1, 1, dtype=torch.int64)
+    terms = [
+        ElementTerm("root", lambda x: torch.sqrt(x[0]) - 0.1, [("x", row)]),
+        ElementTerm("held", lambda x: x[0] + 1.0, [("x", row)], linear=True),
+    ]
+    settings = ProjectionSettings(initial_damping=1e-13, max_iterations=1, least_extrapolation=math.inf)
+    result = guided_projection({"x": torch.ones(1, 1, dtype=DOUBLE)}, terms, settings=settings)
+    half = -0.5 * (0.5 * 0.9 + 2.0) / (0.5**2 + 1.0)
+    assert float(result.blocks["x"]) == pytest.approx(1.0 + half)
+    promised = 0.5 * (0.9**2 + 2.0**2) - 0.5 * ((0.9 + 0.5 * half) ** 2 + (2.0 + half) ** 2)
+    actual = 0.5 * (0.9**2 + 2.0**2) - 0.5 * ((math.sqrt(1.0 + half) - 0.1) ** 2 + (2.0 + half) ** 2)
+    assert result.history[1].gain == pytest.approx(actual / promised)

@@ -1,0 +1,55 @@
+"""How a run goes on after each step: when a minimum is suspected, and when it is not suspected again."""
+
+from __future__ import annotations
+
+import pytest
+
+from torchfair.projection import ProjectionSettings, Status
+from torchfair.projection.course import Course, Outcome, Standing
+from torchfair.projection.damping import Damping
+
+SETTINGS = ProjectionSettings(merit_tolerance=1e-6, patience=3)
+TAKEN = Outcome(Damping(1.0), gain=1.0, size=1.0, short=False, accepted=True)
+REFUSED = Outcome(Damping(1.0), gain=0.0, size=1e-12, short=True, accepted=False)
+
+
+def start() -> Course:
+    return Course(Standing(merit=1.0, gradient=0.5, floor=0.0), Damping(1.0), accuracy=1e-2)
+
+
+def after_falls(course: Course, *falls: float) -> Course:
+    """After steps that lower the merit by these fractions."""
+    for fall in falls:
+        standing = Standing(course.merit * (1.0 - fall), 0.5, 0.0)
+        course = course.after(TAKEN, standing, SETTINGS, inexact=False)
+    return course
+
+
+def test_as_many_small_falls_as_patience_asks_for_are_rest() -> None:
+    """Those before them, however large, do not count."""
+    assert after_falls(start(), 0.5, 1e-8, 1e-8).suspicion is None
+    assert after_falls(start(), 0.5, 1e-8, 1e-8, 1e-8).suspicion is Status.MERIT_TOLERANCE
+    assert after_falls(start(), 1e-8, 1e-8, 1e-5, 1e-8, 1e-8).suspicion is None
+    assert after_falls(start(), 4e-7, 4e-7, 4e-7).suspicion is None  # together 1.2e-6
+
+
+def test_what_was_found_to_be_no_minimum_is_suspected_only_after_new_rest() -> None:
+    doubtful = after_falls(start(), 1e-8, 1e-8, 1e-8).judged(certified=False, goes_on=True)
+    assert doubtful.finished(SETTINGS) is None
+    assert after_falls(doubtful, 1e-8, 1e-8).suspicion is None
+    assert after_falls(doubtful, 1e-8, 1e-8, 1e-8).suspicion is Status.MERIT_TOLERANCE
+
+
+def test_a_state_from_which_short_steps_are_refused_is_judged_once() -> None:
+    """The answer would be the same; after a step that is taken the state is another one."""
+    first = start().after(REFUSED, start().standing, SETTINGS, inexact=False)
+    assert first.suspicion is Status.STEP_TOLERANCE
+    going = first.judged(certified=False, goes_on=True)
+    assert going.after(REFUSED, going.standing, SETTINGS, inexact=False).suspicion is None
+    moved = after_falls(going, 0.1)
+    assert moved.after(REFUSED, moved.standing, SETTINGS, inexact=False).suspicion is Status.STEP_TOLERANCE
+
+
+@pytest.mark.parametrize("gain", [1.0, 1.5, 1e150])
+def test_damping_falls_to_a_third_however_much_a_step_gains(gain: float) -> None:
+    assert Damping(6.0).accepted(gain).value == pytest.approx(2.0)
