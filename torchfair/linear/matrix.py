@@ -62,7 +62,7 @@ class MatrixSystem:
         places.sort_indices()
         where = sp.csc_matrix((np.arange(1, places.nnz + 1), places.indices, places.indptr), (size, size))
         entries = sp.tril(self._matrix, format="coo")
-        values = np.zeros(places.nnz)
+        values: np.ndarray = np.zeros(places.nnz)
         if entries.nnz:  # SciPy answers with a sparse matrix where it is asked for no entry
             positions = np.asarray(where[entries.row, entries.col]).ravel() - 1
             values = np.bincount(positions, entries.data, places.nnz)
@@ -129,9 +129,10 @@ def _to_scipy(matrix: Matrix) -> Any:
         matrix = sp.csr_matrix((entries.values().numpy(), places), (matrix.shape[0], matrix.shape[1]))
     if not sp.issparse(matrix):
         raise ShapeError("matrix", expected, shown(matrix))
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.dtype.kind != "f":
-        raise ShapeError("matrix", expected, f"{matrix.shape} {matrix.dtype}")
-    result = sp.csr_matrix(matrix, dtype=np.float64)
+    given: Any = matrix
+    if given.ndim != 2 or given.shape[0] != given.shape[1] or given.dtype.kind != "f":
+        raise ShapeError("matrix", expected, f"{given.shape} {given.dtype}")
+    result = sp.csr_matrix(given, dtype=np.float64)
     if not np.isfinite(result.data).all():
         raise SingularSystemError("the matrix is not finite")
     return result

@@ -99,7 +99,8 @@ class GuidedProjection(Problem):
 
         The members share terms and fixed unknowns. They are solved as one system with their block structure, which is
         many times as fast as one after the other where they are small. Damping, acceptance and convergence are those of
-        each member, so results are the same up to rounding; only a singular system raises the damping of all.
+        each member, so results are the same up to rounding; only a singular system raises the damping of all, and ends
+        all if it stays singular.
 
         Raises:
             ShapeError: blocks are not ``(batch, n, d)`` of the sizes compiled for.

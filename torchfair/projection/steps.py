@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import wraps
+from typing import Concatenate, ParamSpec, TypeVar
 
 import torch
 from torch import Tensor
 
+from .._threads import threads_for
 from ..errors import SettingsError, SingularSystemError
 from .certificate import certified
 from .course import Course, Outcome, Standing
@@ -26,11 +29,25 @@ from .system import Evaluation
 from .trials import Guard, Trials
 from .vanishing import vanishing
 
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
 _LONGEST_EXTRAPOLATION = 3.0
 _LARGEST_CORRECTION = 0.75  # of the step, in the norm of the damping (Transtrum and Sethna 2012)
 
 
-@torch.no_grad()
+def _plain(function: Callable[Concatenate[Problem, _P], _R]) -> Callable[Concatenate[Problem, _P], _R]:
+    """Without gradients, and with few threads for small problems."""
+
+    @wraps(function)
+    def plainly(problem: Problem, *arguments: _P.args, **options: _P.kwargs) -> _R:
+        with torch.no_grad(), threads_for(problem.layout.num_unknowns, problem.structure.device):
+            return function(problem, *arguments, **options)
+
+    return plainly
+
+
+@_plain
 def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = None) -> ProjectionState:
     """The state from which a run starts.
 
@@ -68,7 +85,7 @@ def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = 
     return _judged(problem, ProjectionState(evaluation, linearised, settings, tuple(courses)))
 
 
-@torch.no_grad()
+@_plain
 def of_members(problem: Problem, state: ProjectionState, chosen: list[int]) -> tuple[Problem, ProjectionState]:
     """The problem and the state of some members of a batch alone, to go on without the others.
 
@@ -90,7 +107,7 @@ def of_members(problem: Problem, state: ProjectionState, chosen: list[int]) -> t
     return smaller, replace(state, evaluation=evaluation, linearised=linearised, courses=courses, heeded=heeded)
 
 
-@torch.no_grad()
+@_plain
 def step(
     problem: Problem, state: ProjectionState, guard: Guard | None = None
 ) -> tuple[ProjectionState, IterationRecord]:
