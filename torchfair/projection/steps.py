@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Concatenate, ParamSpec, TypeVar, cast
 
 import torch
 from torch import Tensor
@@ -44,7 +44,7 @@ def _plain(function: Callable[Concatenate[Problem, _P], _R]) -> Callable[Concate
         with torch.no_grad(), threads_for(problem.layout.num_unknowns, problem.structure.device):
             return function(problem, *arguments, **options)
 
-    return plainly
+    return cast(Callable[Concatenate[Problem, _P], _R], plainly)
 
 
 @_plain
