@@ -30,7 +30,8 @@ def test_as_many_small_falls_as_patience_asks_for_are_rest() -> None:
     assert after_falls(start(), 0.5, 1e-8, 1e-8).suspicion is None
     assert after_falls(start(), 0.5, 1e-8, 1e-8, 1e-8).suspicion is Status.MERIT_TOLERANCE
     assert after_falls(start(), 1e-8, 1e-8, 1e-5, 1e-8, 1e-8).suspicion is None
-    assert after_falls(start(), 4e-7, 4e-7, 4e-7).suspicion is None  # together 1.2e-6
+    assert after_falls(start(), 2e-6, 1e-8, 1e-8).suspicion is None
+    assert after_falls(start(), 9e-7, 9e-7, 9e-7).suspicion is Status.MERIT_TOLERANCE  # each of them
 
 
 def test_what_was_found_to_be_no_minimum_is_suspected_only_after_new_rest() -> None:

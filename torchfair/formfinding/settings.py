@@ -18,7 +18,12 @@ FORMULATIONS = ("reduced", "lifted")
 
 def _default_projection() -> ProjectionSettings:
     return ProjectionSettings(
-        max_iterations=60, initial_damping=0.1, damping_scale="identity", merit_tolerance=5e-4, patience=6
+        max_iterations=80,
+        initial_damping=0.1,
+        damping_scale="identity",
+        merit_tolerance=5e-4,
+        patience=6,
+        least_uncorrected_gain=0.6,
     )
 
 
