@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from enum import Enum
 
@@ -79,12 +80,19 @@ class SymmetricProblem:
         self._keeps_faces = FaceGuard(self.topology, lambda state: state["vertices"])
 
     def snapshot(self) -> Callable[[], None]:
-        """A function that puts targets, pull and saddle sides back to what they are now."""
+        """A function that puts targets, pull and saddle sides back to what they are now.
+
+        Linear solvers too: those that fell back to double precision would go on in it, and round differently.
+        """
         targets, pull, sides, compiled = self.targets.clone(), self.pull, self.sides, dict(self._compiled)
         saved = {name: value.clone() if isinstance(value, Tensor) else value for name, value in vars(sides).items()}
 
+        solvers = {aim: copy.copy(problem.solver) for aim, problem in compiled.items()}
+
         def restore() -> None:
             self.targets, self.pull, self._compiled = targets, pull, compiled
+            for aim, solver in solvers.items():
+                compiled[aim].solver = solver
             vars(sides).update(saved)
 
         return restore
