@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
@@ -14,14 +13,12 @@ from ..constraints.lifted_absolute_curvature import lifted_absolute_curvature_bl
 from ..energies import total_absolute_curvature
 from ..geometry import corner_angles, vertex_normals
 from ..geometry.spline_curves import SplineCurves
+from ..linear import Factor, factorise
 from ..normalisation import Normalisation
 from ..projection import ElementTerm
 from ..topology import Topology
 from .boundary_track import BoundaryTrack
 from .form_settings import FormSettings
-
-if TYPE_CHECKING:
-    from scipy.sparse.linalg import SuperLU
 
 _EXACTLY = 10.0  # weight of tangent planes in the end, over that on the way
 _EVENED = 0.2  # of the extent of the mesh
@@ -95,19 +92,17 @@ class FormProblem:
 
     def _evened(self, normals: Tensor) -> Tensor:
         """Unit vectors ``d`` with ``(I + (f sqrt(V))^2 / 6 L) d ~ n``, L the graph Laplacian."""
-        found = torch.from_numpy(self._evening.solve(normals.numpy()))
+        found = self._evening.solve(normals).values
         length = torch.linalg.vector_norm(found, dim=1, keepdim=True)
         return torch.where(length > _LEAST_LENGTH, found / length.clamp_min(_LEAST_LENGTH), normals)
 
     @cached_property
-    def _evening(self) -> SuperLU:
+    def _evening(self) -> Factor:
         from scipy.sparse import eye_array
-        from scipy.sparse.linalg import splu
 
         size = self.topology.num_vertices
         reach = (_EVENED * size**0.5) ** 2 / 6.0
-        matrix = (eye_array(size) + reach * graph_laplacian(self.topology)).tocsc()
-        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        return factorise(eye_array(size) + reach * graph_laplacian(self.topology))
 
     # ---- vertices move in space ------------------------------------------------------------------------
 

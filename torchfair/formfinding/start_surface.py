@@ -12,6 +12,7 @@ from torch import Tensor
 from .._graph import graph_laplacian
 from ..curves import ClosedCurve
 from ..errors import MeshError
+from ..linear import factorise
 from ..topology import Topology
 
 _TURNS = 360  # places of the second curve that are tried against the first
@@ -123,12 +124,12 @@ def _rows(rows: int, columns: int) -> np.ndarray:
 
 def _harmonic(vertices: Tensor, topology: Topology) -> Tensor:
     """Puts every inner vertex in the mean of its neighbours; boundary vertices stay."""
-    from scipy.sparse.linalg import splu
-
     free = np.flatnonzero(~topology.is_boundary_vertex.numpy())
     held = np.flatnonzero(topology.is_boundary_vertex.numpy())
     rows = graph_laplacian(topology)[free]
-    inner = splu(rows[:, free].tocsc()).solve(-(rows[:, held] @ vertices[held].numpy()))
+    if not free.size:
+        return vertices.clone()
+    pulls = torch.from_numpy(-(rows[:, held] @ vertices[held].numpy()))
     result = vertices.clone()
-    result[free] = torch.from_numpy(inner)
+    result[free] = factorise(rows[:, free]).solve(pulls).values
     return result
