@@ -50,9 +50,14 @@ class TangentPlanes:
         return self._asked is not None and points is self._asked[0] and points._version == self._asked[1]
 
 
-def plane_distance(x: Tensor, foot: Tensor, normal: Tensor) -> Tensor:
-    """Signed distance of the vertex ``x`` (1, 3) from the plane through ``foot``."""
-    return torch.dot(normal, x[0] - foot)
+def plane_distances(x: Tensor, feet: Tensor, normals: Tensor) -> Tensor:
+    """(n,) signed distances of vertices ``x`` (n, 1, 3) from the planes through ``feet``, all at once."""
+    return ((x[:, 0] - feet) * normals).sum(1)
+
+
+def plane_normals(x: Tensor, feet: Tensor, normals: Tensor) -> Tensor:
+    """(n, 3) their derivatives."""
+    return normals
 
 
 def closeness_terms(planes: Feet, vertices: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
@@ -61,7 +66,18 @@ def closeness_terms(planes: Feet, vertices: Tensor, *, weight: float, block: str
     def refresh(state: State) -> tuple[Tensor, ...]:
         return tuple(part[vertices] for part in planes(state))
 
-    return [ElementTerm("closeness", plane_distance, [(block, vertices[:, None])], weight=weight, refresh=refresh)]
+    stencil = [(block, vertices[:, None])]
+    return [
+        ElementTerm(
+            "closeness",
+            plane_distances,
+            stencil,
+            weight=weight,
+            refresh=refresh,
+            jacobian=plane_normals,
+            batched=True,
+        )
+    ]
 
 
 def distance_limit_terms(planes: Feet, limits: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
@@ -70,11 +86,11 @@ def distance_limit_terms(planes: Feet, limits: Tensor, *, weight: float, block: 
     The limits are on the device of the vertices.
     """
 
-    def limit(x: Tensor, foot: Tensor, normal: Tensor, most: Tensor) -> Tensor:
-        return barrier(most - plane_distance(x, foot, normal).abs(), 0.5 * most)
+    def limit(x: Tensor, feet: Tensor, normals: Tensor, most: Tensor) -> Tensor:
+        return barrier(most - plane_distances(x, feet, normals).abs(), 0.5 * most)
 
     def refresh(state: State) -> tuple[Tensor, Tensor, Tensor]:
         return (*planes(state), limits)
 
     stencil = [(block, torch.arange(limits.shape[0], device=limits.device)[:, None])]
-    return [ElementTerm("distance limit", limit, stencil, weight=weight, refresh=refresh)]
+    return [ElementTerm("distance limit", limit, stencil, weight=weight, refresh=refresh, batched=True)]
