@@ -106,7 +106,8 @@ def test_handles_do_not_glide() -> None:
     vertices, topology = bent_sheet()
     targets = {2: vertices[2] + torch.tensor([-0.3, 0.0, 0.1], dtype=DOUBLE)}
     gliding = []
-    for fair in (problem(), problem(targets=targets)):
+    glide = FairSettings(boundary="glide")
+    for fair in (problem(settings=glide), problem(targets=targets, settings=glide)):
         (term,) = (term for term in fair.terms(1.0) if term.name == "boundary gliding")
         gliding.append(set(term.stencil[0][1][:, 0].tolist()))
     corners = {0, 4, 20, 24}
