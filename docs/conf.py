@@ -19,7 +19,10 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = True
 nitpicky = True  # a reference that leads nowhere is a warning
-nitpick_ignore_regex = [("py:class", r"(torch|abc|collections|scipy)\..*")]
+nitpick_ignore_regex = [
+    ("py:class", r"(torch|abc|collections|scipy)\..*"),
+    ("py:class", r"torchfair\.projection\.(system\.Evaluation|state\.Linearised|course\.Course)"),  # parts of a state
+]
 
 
 def mark_shapes(app, what, name, obj, options, lines):

@@ -98,7 +98,7 @@ def factorise(matrix: Matrix, damping: Tensor | None = None, *, solver: str | Li
             analysis is to be kept for other matrices of the same pattern.
 
     Returns:
-        A factor: ``factor.solve(right).values`` for ``right`` (N,) or (N, k) torch tensors.
+        A factor. ``factor.solve(right).values`` is the solution for ``right`` (N,) or (N, k), torch tensors.
 
     Raises:
         ShapeError: not a square matrix.

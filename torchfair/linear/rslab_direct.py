@@ -80,7 +80,7 @@ class RslabDirect(SparseDirect):
         )
 
     def factor(self, values: np.ndarray) -> Substitution:
-        """See :class:`SparseDirect`."""
+        """Factors a matrix of the pattern; see ``SparseDirect``."""
         if not self.single:
             return self._double(values)
         try:

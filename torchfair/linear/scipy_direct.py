@@ -24,7 +24,7 @@ class ScipyDirect(SparseDirect):
         self._full, self._size = lower.full, lower.size
 
     def factor(self, values: np.ndarray) -> Substitution:
-        """See :class:`SparseDirect`."""
+        """Factors a matrix of the pattern; see ``SparseDirect``."""
         from scipy.sparse.linalg import splu
 
         offsets, rows, source = self._full
