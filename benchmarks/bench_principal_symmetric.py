@@ -42,8 +42,8 @@ from symmetric_problems import CASES, SHAPES, Handles, prepared
 from torch import Tensor
 
 import torchfair
-from torchfair.formfinding.symmetric_design import SymmetricDesign
-from torchfair.formfinding.symmetric_report import condition_residuals
+from torchfair.formfinding.symmetric.design import SymmetricDesign
+from torchfair.formfinding.symmetric.measures import condition_residuals
 from torchfair.geometry import edge_lengths
 from torchfair.projection.layout import State
 

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.formfinding import strip_normals
-from torchfair.formfinding.symmetric_design import SymmetricDesign
+from torchfair.formfinding.symmetric.design import SymmetricDesign
 from torchfair.geometry import edge_lengths
 from torchfair.principal import (
     DevelopableStrips,

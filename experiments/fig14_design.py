@@ -40,7 +40,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.formfinding import SymmetricSettings
-from torchfair.formfinding.symmetric_design import SymmetricDesign
+from torchfair.formfinding.symmetric.design import SymmetricDesign
 from torchfair.geometry import planarity
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.shapes import ShapeMesh, Torus, principal_triangles

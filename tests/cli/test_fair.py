@@ -139,10 +139,10 @@ def test_interruption_writes_the_best_mesh(
 def test_ctrl_c_while_setting_up_or_measuring_writes_everything(
     place: str, roof: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from torchfair.formfinding import fair_problem
-    from torchfair.formfinding import normal_variation as job
+    from torchfair.formfinding.fair import problem
+    from torchfair.formfinding.fair import recipe as job
 
-    owner: object = job if place == "fair_measures" else fair_problem.FairProblem
+    owner: object = job if place == "fair_measures" else problem.FairProblem
     name = place.split(".")[-1]
     monkeypatch.setattr(owner, name, nth(getattr(owner, name), 1, press))
     output = tmp_path / "out.obj"

@@ -10,7 +10,7 @@ import torch
 from helpers import wavy_grid
 
 from torchfair.cli import main
-from torchfair.formfinding.symmetric_report import condition_residuals
+from torchfair.formfinding.symmetric.measures import condition_residuals
 from torchfair.io import load_edge_labels, load_mesh, save_edge_labels, save_mesh
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.shapes import Catenoid, Paraboloid, Torus, principal_triangles

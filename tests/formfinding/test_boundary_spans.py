@@ -6,7 +6,7 @@ import torch
 
 from torchfair.curves import ClosedCurve
 from torchfair.formfinding import start_surface
-from torchfair.formfinding.boundary_track import BoundaryTrack
+from torchfair.formfinding.form.boundary_track import BoundaryTrack
 from torchfair.geometry import SplineCurves
 
 

@@ -11,8 +11,9 @@ from helpers import DOUBLE
 from torch import Tensor
 
 from torchfair.curves import ClosedCurve
-from torchfair.formfinding import FormSettings, form_level, minimise_absolute_curvature, start_surface
-from torchfair.formfinding.boundary_track import BoundaryTrack
+from torchfair.formfinding import FormSettings, minimise_absolute_curvature, start_surface
+from torchfair.formfinding.form import level
+from torchfair.formfinding.form.boundary_track import BoundaryTrack
 from torchfair.projection import ProjectionSettings
 from torchfair.subdivision import loop
 
@@ -94,7 +95,7 @@ def test_prescribed_normals_of_new_vertices_are_unit_means_of_both_ends() -> Non
     normals[ring[1]] = torch.tensor([-0.6, 0.0, 0.8], dtype=DOUBLE)
     normals[ring[2]] = torch.tensor([0.6, 0.0, -0.8], dtype=DOUBLE)
     step = loop(coarse, boundary="interpolate", corners=track.corners)
-    finer = form_level._refined_normals(normals, step)
+    finer = level._refined_normals(normals, step)
     assert torch.equal(finer[: coarse.num_vertices], normals)
     between = [set(edge) for edge in coarse.boundary_edges.tolist()].index(set(ring[:2].tolist()))
     expected = torch.zeros_like(finer[coarse.num_vertices :])

@@ -12,7 +12,7 @@ from torch import Tensor
 from torchfair import MeshError, Topology
 from torchfair.energies import normal_variation
 from torchfair.formfinding import FairSettings, minimise_normal_variation
-from torchfair.formfinding.fair_problem import FairProblem
+from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.geometry import corner_angles
 
 

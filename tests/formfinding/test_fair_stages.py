@@ -11,8 +11,8 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.formfinding import FairSettings, minimise_normal_variation
-from torchfair.formfinding.fair_problem import FairProblem
-from torchfair.formfinding.fair_stages import FairStages
+from torchfair.formfinding.fair.problem import FairProblem
+from torchfair.formfinding.fair.stages import FairStages
 from torchfair.geometry.planarity import planarity
 from torchfair.shapes import Enneper, irregular_triangles
 

@@ -13,9 +13,9 @@ from torch import Tensor
 from torchfair.curves import ClosedCurve
 from torchfair.energies import total_absolute_curvature
 from torchfair.formfinding import FormSettings, start_surface
-from torchfair.formfinding.boundary_track import BoundaryTrack
-from torchfair.formfinding.form_problem import FormProblem, staying_vertices
-from torchfair.formfinding.form_report import form_measures
+from torchfair.formfinding.form.boundary_track import BoundaryTrack
+from torchfair.formfinding.form.measures import form_measures
+from torchfair.formfinding.form.problem import FormProblem, staying_vertices
 from torchfair.geometry import corner_angles, edge_lengths, vertex_normals
 from torchfair.normalisation import Normalisation
 

@@ -13,7 +13,7 @@ from torchfair import Topology
 from torchfair.boundary import boundary_corners, boundary_pieces
 from torchfair.energies import normal_variation
 from torchfair.formfinding import FairSettings, minimise_normal_variation
-from torchfair.formfinding.fair_problem import FairProblem
+from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.geometry import SplineCurves, edge_lengths, face_areas, face_normals
 from torchfair.geometry.closest_point import ReferenceSurface
 

@@ -22,11 +22,11 @@ from torchfair.formfinding import (
     SymmetricDesign,
     SymmetricResult,
     SymmetricSettings,
-    form_stages,
     minimise_absolute_curvature,
     minimise_normal_variation,
     principal_symmetric,
 )
+from torchfair.formfinding.form import stages
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.projection import IterationRecord, Status
 from torchfair.shapes import Cylinder, Torus, principal_triangles
@@ -42,7 +42,7 @@ def handler_is_put_back() -> Iterator[None]:
 
 
 def disturb(monkeypatch: pytest.MonkeyPatch, place: str, n: int, act: Act) -> None:
-    """Does ``act()`` within the n-th call of a function, such as ``form_problem:FormProblem.terms``."""
+    """Does ``act()`` within the n-th call of a function, such as ``form.problem:FormProblem.terms``."""
     module, path = place.split(":")
     owner: object = importlib.import_module(f"torchfair.formfinding.{module}")
     *owners, name = path.split(".")
@@ -61,16 +61,16 @@ def quads(n: int = 5) -> tuple[Tensor, Topology]:
 
 FAIR = replace(FairSettings(), planar="none", projection=replace(FairSettings().projection, max_iterations=3))
 FAIR_PHASES = {
-    "start": ("normal_variation:one_start", 1, 0),
-    "problem": ("fair_problem:boundary_corners", 1, 0),
-    "plan": ("fair_problem:FairProblem.shares", 1, 0),
-    "first terms": ("fair_problem:FairProblem.terms", 1, 0),
-    "first compiled": ("fair_stages:GuidedProjection", 1, 0),
-    "second terms": ("fair_problem:FairProblem.terms", 2, 1),
-    "third compiled": ("fair_stages:GuidedProjection.with_terms", 2, 2),
-    "blocks in between": ("fair_problem:FairProblem.blocks", 2, 1),
-    "measuring the result": ("normal_variation:fair_measures", 1, 3),
-    "measuring the start": ("normal_variation:fair_measures", 2, 3),
+    "start": ("fair.recipe:one_start", 1, 0),
+    "problem": ("fair.problem:boundary_corners", 1, 0),
+    "plan": ("fair.problem:FairProblem.shares", 1, 0),
+    "first terms": ("fair.problem:FairProblem.terms", 1, 0),
+    "first compiled": ("fair.stages:GuidedProjection", 1, 0),
+    "second terms": ("fair.problem:FairProblem.terms", 2, 1),
+    "third compiled": ("fair.stages:GuidedProjection.with_terms", 2, 2),
+    "blocks in between": ("fair.problem:FairProblem.blocks", 2, 1),
+    "measuring the result": ("fair.recipe:fair_measures", 1, 3),
+    "measuring the start": ("fair.recipe:fair_measures", 2, 3),
 }
 
 
@@ -124,19 +124,19 @@ def barrel() -> tuple[Tensor, Topology]:
 
 FORM = replace(FormSettings(), boundary="glide", projection=replace(FormSettings().projection, max_iterations=3))
 FORM_PHASES = {  # function, call, stages of the coarse level that are done (-1: all), whether the fine level is
-    "start": ("absolute_curvature:one_start", 1, 0, False),
-    "measuring the start": ("absolute_curvature:form_measures", 1, 0, False),
-    "problem": ("form_level:FormProblem", 1, 0, False),
-    "directions": ("form_problem:FormProblem.directions", 1, 0, False),
-    "first compiled": ("form_stages:GuidedProjection", 1, 0, False),
-    "doubt": ("form_stages:FormStages._is_doubtful", 1, 1, False),
-    "second compiled": ("form_stages:GuidedProjection", 2, 1, False),
-    "third compiled": ("form_stages:GuidedProjection.with_terms", 1, 2, False),
-    "end of the level": ("form_level:FormLevel.moved", 1, -1, False),
-    "refinement": ("form_level:loop", 1, -1, False),
-    "finer problem": ("form_level:FormProblem", 2, -1, False),
-    "finer compiled": ("form_stages:GuidedProjection", 3, -1, False),
-    "measuring the result": ("absolute_curvature:form_measures", 2, -1, True),
+    "start": ("form.recipe:one_start", 1, 0, False),
+    "measuring the start": ("form.recipe:form_measures", 1, 0, False),
+    "problem": ("form.level:FormProblem", 1, 0, False),
+    "directions": ("form.problem:FormProblem.directions", 1, 0, False),
+    "first compiled": ("form.stages:GuidedProjection", 1, 0, False),
+    "doubt": ("form.stages:FormStages._is_doubtful", 1, 1, False),
+    "second compiled": ("form.stages:GuidedProjection", 2, 1, False),
+    "third compiled": ("form.stages:GuidedProjection.with_terms", 1, 2, False),
+    "end of the level": ("form.level:FormLevel.moved", 1, -1, False),
+    "refinement": ("form.level:loop", 1, -1, False),
+    "finer problem": ("form.level:FormProblem", 2, -1, False),
+    "finer compiled": ("form.stages:GuidedProjection", 3, -1, False),
+    "measuring the result": ("form.recipe:form_measures", 2, -1, True),
 }
 
 
@@ -180,7 +180,7 @@ def test_a_second_start_that_is_interrupted_does_not_replace_the_better_surface(
 ) -> None:
     """Where the coarse smoothings are in doubt, the last one is tried from the start."""
     vertices, topology = barrel()
-    monkeypatch.setattr(form_stages.FormStages, "_is_doubtful", lambda *_: True)
+    monkeypatch.setattr(stages.FormStages, "_is_doubtful", lambda *_: True)
     undisturbed = minimise_absolute_curvature(vertices, topology, settings=FORM)
     second = len(FORM.smoothings()) - 1  # stages with coarser smoothings
     starts: list[int] = []
@@ -264,21 +264,21 @@ def test_a_callback_that_raises_leaves_a_design_as_it_was(
 
 SYMMETRIC = SymmetricSettings(rounds=2, most_steps=30)
 SYMMETRIC_PHASES = {
-    "handles": ("principal_symmetric:read_handles", 1, 0),
-    "measuring the start": ("symmetric_design:symmetric_measures", 1, 0),
-    "snapshot": ("symmetric_problem:SymmetricProblem.snapshot", 1, 0),
-    "first decision": ("symmetric_rounds:SymmetricRounds._decide", 1, 0),
-    "first compiled": ("symmetric_problem:GuidedProjection", 1, 0),
-    "second compiled": ("symmetric_problem:GuidedProjection", 2, 1),
-    "second decision": ("symmetric_rounds:SymmetricRounds._decide", 2, 1),
-    "score": ("symmetric_rounds:SymmetricRounds._score", 1, 1),
-    "measuring the result": ("symmetric_design:symmetric_measures", 2, 1),
-    "normals": ("symmetric_design:strip_normals", 1, 1),
-    "refinement": ("symmetric_design:loop", 1, 1),
-    "finer problem": ("symmetric_design:SymmetricProblem", 2, 1),
-    "measuring the finer start": ("symmetric_design:symmetric_measures", 3, 1),
-    "finer snapshot": ("symmetric_problem:SymmetricProblem.snapshot", 2, 1),
-    "measuring the finer result": ("symmetric_design:symmetric_measures", 4, 2),
+    "handles": ("symmetric.recipe:read_handles", 1, 0),
+    "measuring the start": ("symmetric.design:symmetric_measures", 1, 0),
+    "snapshot": ("symmetric.problem:SymmetricProblem.snapshot", 1, 0),
+    "first decision": ("symmetric.rounds:SymmetricRounds._decide", 1, 0),
+    "first compiled": ("symmetric.problem:GuidedProjection", 1, 0),
+    "second compiled": ("symmetric.problem:GuidedProjection", 2, 1),
+    "second decision": ("symmetric.rounds:SymmetricRounds._decide", 2, 1),
+    "score": ("symmetric.rounds:SymmetricRounds._score", 1, 1),
+    "measuring the result": ("symmetric.design:symmetric_measures", 2, 1),
+    "normals": ("symmetric.design:strip_normals", 1, 1),
+    "refinement": ("symmetric.design:loop", 1, 1),
+    "finer problem": ("symmetric.design:SymmetricProblem", 2, 1),
+    "measuring the finer start": ("symmetric.design:symmetric_measures", 3, 1),
+    "finer snapshot": ("symmetric.problem:SymmetricProblem.snapshot", 2, 1),
+    "measuring the finer result": ("symmetric.design:symmetric_measures", 4, 2),
 }
 
 

@@ -11,7 +11,7 @@ from helpers import DOUBLE, random_rotation, tetrahedron
 from torchfair import MeshError, ShapeError, Topology
 from torchfair.constraints.principal_symmetric import star_stencil, unevenness
 from torchfair.formfinding import SymmetricDesign, SymmetricSettings, principal_symmetric, strip_normals
-from torchfair.formfinding.symmetric_report import condition_residuals
+from torchfair.formfinding.symmetric.measures import condition_residuals
 from torchfair.geometry import vertex_normals
 from torchfair.principal import PrincipalEdges, developable_strips, principal_edges_of_lattice, star_spheres
 from torchfair.projection.result import IterationRecord

@@ -7,8 +7,8 @@ import torch
 from helpers import DOUBLE
 
 from torchfair.formfinding import SymmetricDesign, SymmetricSettings
-from torchfair.formfinding.symmetric_problem import Aim
-from torchfair.formfinding.symmetric_rounds import SymmetricRounds
+from torchfair.formfinding.symmetric.problem import Aim
+from torchfair.formfinding.symmetric.rounds import SymmetricRounds
 from torchfair.principal import principal_edges_of_lattice
 from torchfair.shapes import Torus, principal_triangles
 

@@ -7,18 +7,18 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
-from .. import constraints as c
-from .._graph import graph_laplacian
-from ..constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks, lifted_absolute_curvature_terms
-from ..energies import total_absolute_curvature
-from ..geometry import corner_angles, vertex_normals
-from ..geometry.spline_curves import SplineCurves
-from ..linear import Factor, factorise
-from ..normalisation import Normalisation
-from ..projection import ElementTerm
-from ..topology import Topology
+from ... import constraints as c
+from ..._graph import graph_laplacian
+from ...constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks, lifted_absolute_curvature_terms
+from ...energies import total_absolute_curvature
+from ...geometry import corner_angles, vertex_normals
+from ...geometry.spline_curves import SplineCurves
+from ...linear import Factor, factorise
+from ...normalisation import Normalisation
+from ...projection import ElementTerm
+from ...topology import Topology
 from .boundary_track import BoundaryTrack
-from .form_settings import FormSettings
+from .settings import FormSettings
 
 _EXACTLY = 10.0  # weight of tangent planes in the end, over that on the way
 _EVENED = 0.2  # of the extent of the mesh

@@ -8,15 +8,15 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from .._interrupts import deferred_interrupts
-from ..constraints.saddle_sides import beyond_tangent_plane, is_negative
-from ..principal import PrincipalEdges
-from ..projection import Callback, ProjectionResult, ProjectionSettings
-from ..projection.layout import State
-from ..stars import pyramid_self_intersections
-from .stopping import interrupted, stopped
-from .symmetric_problem import Aim, SymmetricProblem
-from .symmetric_report import condition_residuals
+from ..._interrupts import deferred_interrupts
+from ...constraints.saddle_sides import beyond_tangent_plane, is_negative
+from ...principal import PrincipalEdges
+from ...projection import Callback, ProjectionResult, ProjectionSettings
+from ...projection.layout import State
+from ...stars import pyramid_self_intersections
+from ..stopping import interrupted, stopped
+from .measures import condition_residuals
+from .problem import Aim, SymmetricProblem
 
 _EXACT = ProjectionSettings(
     max_iterations=25,

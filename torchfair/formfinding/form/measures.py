@@ -7,16 +7,16 @@ import math
 import torch
 from torch import Tensor
 
-from ..constraints import BoundaryNormals
-from ..energies import (
+from ...constraints import BoundaryNormals
+from ...energies import (
     angle_variation,
     normal_variation,
     total_absolute_curvature,
     total_frobenius_curvature,
     total_mean_curvature,
 )
-from ..geometry import corner_angles, edge_lengths, face_areas
-from ..topology import Topology
+from ...geometry import corner_angles, edge_lengths, face_areas
+from ...topology import Topology
 
 
 def form_measures(

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from ..energies import angle_variation, normal_variation, total_mean_curvature
-from ..geometry import corner_angles, face_areas, face_normals
-from ..geometry.planarity import planarity
-from ..normalisation import Normalisation
-from ..topology import Topology
+from ...energies import angle_variation, normal_variation, total_mean_curvature
+from ...geometry import corner_angles, face_areas, face_normals
+from ...geometry.planarity import planarity
+from ...normalisation import Normalisation
+from ...topology import Topology
 
 if TYPE_CHECKING:
-    from .fair_problem import FairProblem
+    from .problem import FairProblem
 
 
 def fair_measures(

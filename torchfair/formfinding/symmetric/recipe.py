@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-from .._interrupts import deferred_interrupts
-from ..principal import PrincipalEdges
-from ..projection import Callback, ProjectionResult
-from ..topology import Topology
-from .handles import read_handles
-from .stopping import interrupted, interrupted_at_the_start
-from .symmetric_design import SymmetricDesign
-from .symmetric_settings import SymmetricSettings
+from ..._interrupts import deferred_interrupts
+from ...principal import PrincipalEdges
+from ...projection import Callback, ProjectionResult
+from ...topology import Topology
+from ..handles import read_handles
+from ..stopping import interrupted, interrupted_at_the_start
+from .design import SymmetricDesign
+from .settings import SymmetricSettings
 
 
 @dataclass(frozen=True)

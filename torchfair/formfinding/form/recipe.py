@@ -8,20 +8,20 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from .._interrupts import deferred_interrupts
-from ..curves import ClosedCurve
-from ..errors import MeshError, ShapeError
-from ..normalisation import Normalisation
-from ..projection import Callback, ProjectionResult
-from ..topology import Topology
+from ..._interrupts import deferred_interrupts
+from ...curves import ClosedCurve
+from ...errors import MeshError, ShapeError
+from ...normalisation import Normalisation
+from ...projection import Callback, ProjectionResult
+from ...topology import Topology
+from ..checks import one_start, refuse_degenerate_faces
+from ..handles import read_handles, refuse_unreachable_handles
+from ..stopping import interrupted, stopped
 from .boundary_track import BoundaryTrack
-from .checks import one_start, refuse_degenerate_faces
-from .form_level import FormJob, FormLevel, Handles
-from .form_problem import staying_vertices
-from .form_report import form_measures
-from .form_settings import FormSettings
-from .handles import read_handles, refuse_unreachable_handles
-from .stopping import interrupted, stopped
+from .level import FormJob, FormLevel, Handles
+from .measures import form_measures
+from .problem import staying_vertices
+from .settings import FormSettings
 
 
 @dataclass(frozen=True)

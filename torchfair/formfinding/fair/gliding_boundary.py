@@ -5,11 +5,11 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..boundary import boundary_pieces
-from ..constraints.gliding import CurveFeet
-from ..geometry.spline_curves import SplineCurves
-from ..projection.layout import State
-from ..topology import Topology
+from ...boundary import boundary_pieces
+from ...constraints.gliding import CurveFeet
+from ...geometry.spline_curves import SplineCurves
+from ...projection.layout import State
+from ...topology import Topology
 
 
 class GlidingBoundary:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..errors import MeshError
-from ..geometry.planarity import planarity
-from ..topology import Topology
+from ...errors import MeshError
+from ...geometry.planarity import planarity
+from ...topology import Topology
 from .settings import FairSettings
 
 

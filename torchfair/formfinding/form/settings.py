@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from ..errors import SettingsError
-from ..projection import ProjectionSettings
-from .checks import check_choice, check_weights
+from ...errors import SettingsError
+from ...projection import ProjectionSettings
+from ..checks import check_choice, check_weights
 
 BOUNDARIES = ("fixed", "glide")
 FORMULATIONS = ("reduced", "lifted")

@@ -9,11 +9,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from .._graph import graph_laplacian
-from ..curves import ClosedCurve
-from ..errors import MeshError
-from ..linear import factorise
-from ..topology import Topology
+from ..._graph import graph_laplacian
+from ...curves import ClosedCurve
+from ...errors import MeshError
+from ...linear import factorise
+from ...topology import Topology
 
 _TURNS = 360  # places of the second curve that are tried against the first
 

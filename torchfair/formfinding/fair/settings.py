@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from .._numbers import check_number, is_number
-from ..errors import SettingsError
-from ..projection import ProjectionSettings
-from .checks import check_choice, check_weights
+from ..._numbers import check_number, is_number
+from ...errors import SettingsError
+from ...projection import ProjectionSettings
+from ..checks import check_choice, check_weights
 
 BOUNDARIES = ("glide", "fixed", "free")
 PLANAR = ("keep", "quads", "none")

@@ -8,19 +8,19 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
-from .. import constraints as c
-from ..boundary import boundary_corners
-from ..constraints.closeness import TangentPlanes
-from ..constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
-from ..geometry import corner_angles, face_areas
-from ..geometry.closest_point import ReferenceSurface
-from ..geometry.planarity import planarity
-from ..projection import ElementTerm
-from ..projection.layout import State
-from ..topology import Topology
-from .checks import refuse_degenerate_faces
-from .fair_guard import FairGuard
+from ... import constraints as c
+from ...boundary import boundary_corners
+from ...constraints.closeness import TangentPlanes
+from ...constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
+from ...geometry import corner_angles, face_areas
+from ...geometry.closest_point import ReferenceSurface
+from ...geometry.planarity import planarity
+from ...projection import ElementTerm
+from ...projection.layout import State
+from ...topology import Topology
+from ..checks import refuse_degenerate_faces
 from .gliding_boundary import GlidingBoundary
+from .guard import FairGuard
 from .planar_faces import faces_to_keep_planar
 from .settings import FairSettings
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from ..curves import ClosedCurve
-from ..errors import MeshError
-from ..subdivision import Refinement
-from ..topology import Topology
+from ...curves import ClosedCurve
+from ...errors import MeshError
+from ...subdivision import Refinement
+from ...topology import Topology
 
 
 class BoundaryTrack:

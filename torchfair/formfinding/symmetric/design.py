@@ -8,26 +8,26 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from .._interrupts import deferred_interrupts
-from .._threads import threads_for
-from ..boundary import boundary_corners
-from ..constraints import BoundaryNormals
-from ..errors import MeshError
-from ..geometry.closest_point import ReferenceSurface
-from ..normalisation import Normalisation
-from ..principal import PrincipalEdges
-from ..principal.principal_edges import PrincipalStars
-from ..projection import Callback, ProjectionResult, Status
-from ..subdivision import Refinement, interpolate_vertices, loop, near
-from ..subdivision.interpolation import BOUNDARY_CORNER
-from ..topology import Topology
-from .checks import one_start, refuse_degenerate_faces
-from .handles import read_handles
+from ..._interrupts import deferred_interrupts
+from ..._threads import threads_for
+from ...boundary import boundary_corners
+from ...constraints import BoundaryNormals
+from ...errors import MeshError
+from ...geometry.closest_point import ReferenceSurface
+from ...normalisation import Normalisation
+from ...principal import PrincipalEdges
+from ...principal.principal_edges import PrincipalStars
+from ...projection import Callback, ProjectionResult, Status
+from ...subdivision import Refinement, interpolate_vertices, loop, near
+from ...subdivision.interpolation import BOUNDARY_CORNER
+from ...topology import Topology
+from ..checks import one_start, refuse_degenerate_faces
+from ..handles import read_handles
+from .measures import symmetric_measures
+from .problem import SymmetricProblem
+from .rounds import SymmetricRounds
+from .settings import SymmetricSettings
 from .strip_normals import strip_normals
-from .symmetric_problem import SymmetricProblem
-from .symmetric_report import symmetric_measures
-from .symmetric_rounds import SymmetricRounds
-from .symmetric_settings import SymmetricSettings
 
 _KEPT_RINGS = 6  # from the boundary on, over which Loop subdivision passes from interpolating to smoothing
 

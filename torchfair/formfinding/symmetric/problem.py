@@ -9,21 +9,21 @@ from enum import Enum
 import torch
 from torch import Tensor
 
-from .. import constraints as c
-from ..constraints.closeness import TangentPlanes
-from ..constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
-from ..constraints.handles import offset
-from ..constraints.lifted_principal_symmetric import lifted_blocks, lifted_principal_symmetric_terms
-from ..constraints.principal_symmetric import between_stars, sphere_blocks
-from ..constraints.saddle_sides import SaddleSides
-from ..geometry import corner_angles
-from ..geometry.closest_point import ReferenceSurface
-from ..principal import PrincipalEdges
-from ..principal.principal_edges import PrincipalStars
-from ..projection import ElementTerm, GuidedProjection
-from ..projection.layout import State
-from .face_guard import FaceGuard
-from .symmetric_settings import SymmetricSettings
+from ... import constraints as c
+from ...constraints.closeness import TangentPlanes
+from ...constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
+from ...constraints.handles import offset
+from ...constraints.lifted_principal_symmetric import lifted_blocks, lifted_principal_symmetric_terms
+from ...constraints.principal_symmetric import between_stars, sphere_blocks
+from ...constraints.saddle_sides import SaddleSides
+from ...geometry import corner_angles
+from ...geometry.closest_point import ReferenceSurface
+from ...principal import PrincipalEdges
+from ...principal.principal_edges import PrincipalStars
+from ...projection import ElementTerm, GuidedProjection
+from ...projection.layout import State
+from ..face_guard import FaceGuard
+from .settings import SymmetricSettings
 
 _SAFE_ANGLE = 2.5  # smallest angles at which the barrier sets in
 _KEPT_MARGIN = 0.1  # share of the margin of saddle sides that is kept where conditions are met exactly

@@ -8,18 +8,18 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from .._interrupts import Interrupts
-from ..energies import total_absolute_curvature
-from ..normalisation import Normalisation
-from ..projection import Callback, ProjectionResult
-from ..subdivision import Refinement, catmull_clark, loop
-from ..topology import Topology
-from ..triangulation import triangulate
+from ..._interrupts import Interrupts
+from ...energies import total_absolute_curvature
+from ...normalisation import Normalisation
+from ...projection import Callback, ProjectionResult
+from ...subdivision import Refinement, catmull_clark, loop
+from ...topology import Topology
+from ...triangulation import triangulate
+from ..stopping import interrupted, interrupted_at_the_start
 from .boundary_track import BoundaryTrack, new_boundary_vertices
-from .form_problem import FormProblem
-from .form_settings import FormSettings
-from .form_stages import FormStages, Stage
-from .stopping import interrupted, interrupted_at_the_start
+from .problem import FormProblem
+from .settings import FormSettings
+from .stages import FormStages, Stage
 
 Handles = tuple[Tensor, Tensor]
 

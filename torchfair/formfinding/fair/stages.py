@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ..projection import Callback, GuidedProjection, ProjectionResult
-from ..projection.run import Observe
-from .fair_problem import FairProblem
-from .stopping import stopped
+from ...projection import Callback, GuidedProjection, ProjectionResult
+from ...projection.run import Observe
+from ..stopping import stopped
+from .problem import FairProblem
 
 _SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
 _LARGEST_SHARE = 1.3

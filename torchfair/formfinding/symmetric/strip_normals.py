@@ -5,11 +5,11 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..constraints.principal_symmetric import excess_length, excess_length_derivative
-from ..geometry._ops import cross, dot
-from ..principal import PrincipalEdges, principal_normals
-from ..principal.principal_edges import PrincipalStars
-from ..projection import ElementTerm, ProjectionSettings, guided_projection
+from ...constraints.principal_symmetric import excess_length, excess_length_derivative
+from ...geometry._ops import cross, dot
+from ...principal import PrincipalEdges, principal_normals
+from ...principal.principal_edges import PrincipalStars
+from ...projection import ElementTerm, ProjectionSettings, guided_projection
 
 _SETTINGS = ProjectionSettings(
     max_iterations=30, initial_damping=1e-3, damping_scale="identity", merit_tolerance=1e-16, step_tolerance=1e-12

@@ -7,15 +7,15 @@ import math
 import torch
 from torch import Tensor
 
-from ..constraints.principal_symmetric import between_stars, star_numbers, star_stencil
-from ..constraints.saddle_sides import beyond_tangent_plane, is_negative
-from ..energies import normal_variation, total_absolute_curvature
-from ..geometry import corner_angles, edge_lengths
-from ..geometry._ops import cross, dot
-from ..principal import PrincipalEdges
-from ..principal.principal_edges import PrincipalStars
-from ..principal.spheres import star_spheres
-from ..stars import pyramid_self_intersections
+from ...constraints.principal_symmetric import between_stars, star_numbers, star_stencil
+from ...constraints.saddle_sides import beyond_tangent_plane, is_negative
+from ...energies import normal_variation, total_absolute_curvature
+from ...geometry import corner_angles, edge_lengths
+from ...geometry._ops import cross, dot
+from ...principal import PrincipalEdges
+from ...principal.principal_edges import PrincipalStars
+from ...principal.spheres import star_spheres
+from ...stars import pyramid_self_intersections
 
 
 def condition_residuals(vertices: Tensor, principal: PrincipalEdges, stars: PrincipalStars) -> dict[str, Tensor]:

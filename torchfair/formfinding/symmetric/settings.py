@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from .._numbers import check_count, check_number
-from ..projection import ProjectionSettings
-from .checks import check_choice, check_weights
+from ..._numbers import check_count, check_number
+from ...projection import ProjectionSettings
+from ..checks import check_choice, check_weights
 
 BOUNDARIES = ("free", "fixed")
 FORMULATIONS = ("spheres", "eliminated", "lifted")

@@ -8,11 +8,11 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from ..projection import Callback, ElementTerm, GuidedProjection, ProjectionResult, ProjectionSettings
-from ..projection.layout import State
-from .face_guard import FaceGuard
-from .form_problem import FormProblem
-from .stopping import stopped
+from ...projection import Callback, ElementTerm, GuidedProjection, ProjectionResult, ProjectionSettings
+from ...projection.layout import State
+from ..face_guard import FaceGuard
+from ..stopping import stopped
+from .problem import FormProblem
 
 Observe = Callable[[Tensor], dict[str, float]]
 Stage = tuple[Tensor, ProjectionResult]

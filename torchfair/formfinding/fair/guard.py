@@ -7,10 +7,10 @@ from functools import cached_property
 
 from torch import Tensor
 
-from ..energies import normal_variation
-from ..geometry import corner_angles, face_areas, face_normals
-from ..projection.layout import State
-from ..topology import Topology
+from ...energies import normal_variation
+from ...geometry import corner_angles, face_areas, face_normals
+from ...projection.layout import State
+from ...topology import Topology
 
 
 class FairGuard:

@@ -9,19 +9,19 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from .._interrupts import deferred_interrupts
-from ..energies import normal_variation
-from ..normalisation import Normalisation
-from ..projection import Callback, ProjectionResult
-from ..projection.layout import State
-from ..topology import Topology
-from .checks import one_start
-from .fair_problem import FairProblem
-from .fair_report import fair_measures
-from .fair_stages import FairStages
-from .handles import read_handles
+from ..._interrupts import deferred_interrupts
+from ...energies import normal_variation
+from ...normalisation import Normalisation
+from ...projection import Callback, ProjectionResult
+from ...projection.layout import State
+from ...topology import Topology
+from ..checks import one_start
+from ..handles import read_handles
+from ..stopping import interrupted
+from .measures import fair_measures
+from .problem import FairProblem
 from .settings import FairSettings
-from .stopping import interrupted
+from .stages import FairStages
 
 Mesh = tuple[Tensor, Topology]
 

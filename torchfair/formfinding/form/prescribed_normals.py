@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..curves import ClosedCurve
-from ..errors import ShapeError
-from ..topology import Topology
+from ...curves import ClosedCurve
+from ...errors import ShapeError
+from ...topology import Topology
 from .boundary_track import BoundaryTrack
 
 

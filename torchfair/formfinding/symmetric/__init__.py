@@ -1,0 +1,1 @@
+"""The job that designs principal-symmetric meshes (paper section 5.2)."""
