@@ -10,9 +10,7 @@ from helpers import DOUBLE, grid_faces
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.formfinding import FairSettings, minimise_normal_variation
-from torchfair.formfinding.fair.problem import FairProblem
-from torchfair.formfinding.fair.stages import FairStages
+from torchfair.formfinding import FairRecipe, FairSettings, minimise_normal_variation
 from torchfair.geometry.planarity import planarity
 from torchfair.shapes import Enneper, irregular_triangles
 
@@ -29,8 +27,11 @@ def quads(warp: float = 0.15, n: int = 5) -> tuple[Tensor, Topology]:
 
 def shares(settings: FairSettings, *, warp: float = 0.0, pull: float = 0.0) -> list[float]:
     vertices, topology = quads(warp)
-    targets = {12: vertices[12] + torch.tensor([0.0, 0.0, pull], dtype=DOUBLE)} if pull else {}
-    return FairProblem(vertices, topology, None, targets, settings).shares()
+    recipe = FairRecipe(vertices, topology, settings=settings)
+    if pull:
+        pulled = recipe.start[12] + torch.tensor([0.0, 0.0, pull], dtype=DOUBLE)
+        recipe.pull({12: recipe.unit.invert(pulled).tolist()})
+    return recipe.problem.shares(recipe.start)
 
 
 @pytest.mark.parametrize(("pull", "count"), [(0.3, 1), (0.5, 1), (0.51, 2), (1.2, 3), (9.9, 20), (30.0, 20)])
@@ -54,11 +55,13 @@ def test_stages_mix_targets_evenly_and_weights_of_planarity_by_powers() -> None:
     target = vertices[12] + torch.tensor([0.0, 0.0, 2.0], dtype=DOUBLE)
     for weight, share in itertools.product((0.0, 0.5, 1e3, 1e6), (0.25, 1.0, 7 / 6)):
         settings = FairSettings(planar="quads", planarity_weight=weight)
-        terms = FairProblem(vertices, topology, None, {12: target}, settings).terms(share)
+        recipe = FairRecipe(vertices, topology, handles={12: target.tolist()}, settings=settings)
+        recipe.pulls.aim(share, recipe.start)
+        terms = recipe.problem.terms(share)
         weights = [term.weight for term in terms if term.name == "planarity"]
         assert weights in ([], [0.0]) if weight == 0.0 else weights == [pytest.approx(max(weight, 1.0) ** share)]
         (handle,) = (term for term in terms if term.name == "handles")
-        missed = handle.values(handle.arguments({"vertices": vertices}))
+        missed = recipe.unit.length * handle.values(handle.arguments(recipe.state()))
         assert float(missed.abs().max()) == pytest.approx(2.0 * min(share, 1.0))
 
 
@@ -85,8 +88,8 @@ def test_the_absolute_value_becomes_sharp_in_stages(continuation: tuple[float, .
     """Constraints are imposed with the bluntest one; results of the last stage are with the smoothing asked for."""
     vertices, topology = quads()
     settings = FairSettings(planar="quads", continuation=continuation, smoothing=0.02)
-    problem = FairProblem(vertices, topology, None, {}, settings)
-    stages = FairStages(problem, None, lambda state: {}).planned()
+    recipe = FairRecipe(vertices, topology, settings=settings)
+    problem, stages = recipe.problem, recipe.plan(recipe.state()).planned()
     bluntest = max(continuation, default=1.0)
     assert stages[:7] == [((i + 1) / 8, bluntest) for i in range(7)]
     assert stages[7:] == [(1.0, factor) for factor in (*continuation, 1.0)]

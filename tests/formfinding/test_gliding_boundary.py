@@ -14,6 +14,7 @@ from torchfair.boundary import boundary_corners, boundary_pieces
 from torchfair.energies import normal_variation
 from torchfair.formfinding import FairSettings, minimise_normal_variation
 from torchfair.formfinding.fair.problem import FairProblem
+from torchfair.formfinding.job import Pulls
 from torchfair.geometry import SplineCurves, edge_lengths, face_areas, face_normals
 from torchfair.geometry.closest_point import ReferenceSurface
 
@@ -48,7 +49,7 @@ def rim_distances(before: Tensor, topology: Topology, after: Tensor, corner_angl
 
 
 def problem(vertices: Tensor, topology: Topology, **settings: object) -> FairProblem:
-    return FairProblem(vertices, topology, None, {}, FairSettings(**settings))
+    return FairProblem(vertices, topology, None, Pulls(vertices), FairSettings(**settings))
 
 
 def test_the_rim_of_a_coarse_dome_glides_on_its_circle() -> None:
@@ -108,13 +109,16 @@ def test_closeness_leaves_the_rim_to_its_curve() -> None:
     for boundary in ("free", "fixed"):
         assert len(drawn(problem(vertices, topology, boundary=boundary))) == len(vertices)
     with_corners = problem(vertices, topology, corner_angle=math.radians(20.0))
-    assert bool(with_corners.fixed["vertices"][rim].all())
+    assert bool(with_corners.stays()[rim].all())
     assert not torch.isin(drawn(with_corners), torch.nonzero(rim).squeeze(1)).any()
     handle = int(torch.nonzero(rim)[3])
-    pulled = FairProblem(vertices, topology, None, {handle: vertices[handle]}, FairSettings())
+    pulls = Pulls(vertices)
+    pulls.pull(torch.tensor([handle]), vertices[[handle]])
+    pulled = FairProblem(vertices, topology, None, pulls, FairSettings())
     assert handle in drawn(pulled).tolist()
     (glide,) = (term for term in pulled.terms(1.0) if term.name == "boundary gliding")
-    assert glide.num_elements == int(rim.sum()) - 1
+    assert glide.element_weights is not None
+    assert float(glide.element_weights.sum()) == int(rim.sum()) - 1
 
 
 def test_the_mesh_of_a_state_has_gliding_vertices_on_their_curves() -> None:
@@ -133,7 +137,7 @@ def test_the_mesh_of_a_state_has_gliding_vertices_on_their_curves() -> None:
 def test_steps_are_judged_by_the_mesh_with_its_rim_in_place() -> None:
     """Rim vertices that are drawn inwards turn faces over, until they are put back; bounds hold there too."""
     vertices, topology = dome()
-    fair = FairProblem(vertices, topology, (vertices, topology), {}, FairSettings())  # so E is not judged
+    fair = FairProblem(vertices, topology, (vertices, topology), Pulls(vertices), FairSettings())  # so E is not judged
     start, rim = {"vertices": vertices}, topology.is_boundary_vertex[:, None]
     inwards = torch.where(rim, vertices * torch.tensor([0.4, 0.4, 1.0], dtype=DOUBLE), vertices)
     turned = (face_normals(inwards, topology) * face_normals(vertices, topology)).sum(1)

@@ -61,16 +61,16 @@ def quads(n: int = 5) -> tuple[Tensor, Topology]:
 
 FAIR = replace(FairSettings(), planar="none", projection=replace(FairSettings().projection, max_iterations=3))
 FAIR_PHASES = {
-    "start": ("fair.recipe:one_start", 1, 0),
+    "start": ("job.recipe:one_start", 1, 0),
+    "measuring the start": ("fair.recipe:fair_measures", 1, 0),
     "problem": ("fair.problem:boundary_corners", 1, 0),
     "plan": ("fair.problem:FairProblem.shares", 1, 0),
     "first terms": ("fair.problem:FairProblem.terms", 1, 0),
-    "first compiled": ("fair.stages:GuidedProjection", 1, 0),
+    "first compiled": ("job.session:GuidedProjection", 1, 0),
     "second terms": ("fair.problem:FairProblem.terms", 2, 1),
-    "third compiled": ("fair.stages:GuidedProjection.with_terms", 2, 2),
+    "third compiled": ("job.session:GuidedProjection.with_terms", 2, 2),
     "blocks in between": ("fair.problem:FairProblem.blocks", 2, 1),
-    "measuring the result": ("fair.recipe:fair_measures", 1, 3),
-    "measuring the start": ("fair.recipe:fair_measures", 2, 3),
+    "measuring the result": ("fair.recipe:fair_measures", 2, 3),
 }
 
 

@@ -12,7 +12,7 @@ from .fair_outputs import PICTURES, FairOutputs
 from .inputs import read_input
 
 if TYPE_CHECKING:
-    from ..formfinding import FairResult, FairSettings
+    from ..formfinding import FairSettings, JobResult, Level
     from ..io import PolygonMesh
 
 NAME = "torchfair fair"
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def solve(
     mesh: PolygonMesh, reference: PolygonMesh | None, arguments: argparse.Namespace
-) -> tuple[FairResult, FairSettings]:
+) -> tuple[JobResult[Level], FairSettings]:
     """Runs the job with a progress display."""
     from ..formfinding import minimise_normal_variation
     from .progress import ProgressDisplay
@@ -118,7 +118,7 @@ def read_settings(arguments: argparse.Namespace) -> FairSettings:
     )
 
 
-def summary(result: FairResult) -> str:
+def summary(result: JobResult[Level]) -> str:
     """What changed, in a few lines."""
     before, after = result.before, result.after
     change = (

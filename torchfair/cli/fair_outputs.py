@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from .outputs import Outputs
 
 if TYPE_CHECKING:
-    from ..formfinding import FairResult, FairSettings
+    from ..formfinding import FairSettings, JobResult, Level
     from ..io import PolygonMesh
 
 PICTURES = ("before_after.png", "edges.png", "gauss_images.png")
@@ -18,7 +18,7 @@ class FairOutputs(Outputs):
     """What ``torchfair fair`` writes."""
 
     def write(
-        self, mesh: PolygonMesh, result: FairResult, settings: FairSettings, arguments: argparse.Namespace
+        self, mesh: PolygonMesh, result: JobResult[Level], settings: FairSettings, arguments: argparse.Namespace
     ) -> None:
         """Writes everything."""
         before, after = (energies["normal_variation"] for energies in (result.before, result.after))
@@ -33,7 +33,7 @@ class FairOutputs(Outputs):
         if self.pictures:
             self._draw(mesh, result, arguments.force)
 
-    def _draw(self, mesh: PolygonMesh, result: FairResult, force: bool) -> None:
+    def _draw(self, mesh: PolygonMesh, result: JobResult[Level], force: bool) -> None:
         from ..viewing import picture_before_after, picture_edges, picture_gauss_images
 
         before, after, topology = mesh.vertices, result.vertices, mesh.topology

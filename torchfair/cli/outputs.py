@@ -12,7 +12,7 @@ from .errors import CommandError
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from ..formfinding import FairResult, FormResult, SymmetricResult
+    from ..formfinding import FormResult, JobResult, SymmetricResult
     from ..topology import Topology
 
 _MESH_FORMATS = (".obj", ".off", ".ply")
@@ -51,7 +51,7 @@ class Outputs:
     def write_mesh_and_report(
         self,
         topology: Topology,
-        result: FairResult | FormResult | SymmetricResult,
+        result: JobResult[Any] | FormResult | SymmetricResult,
         settings: object,
         arguments: argparse.Namespace,
         extra: Mapping[str, Any],

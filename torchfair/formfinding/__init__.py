@@ -1,6 +1,6 @@
 """Formfinding jobs: short recipes over energies, constraints and guided projection (paper section 5)."""
 
-from .fair.recipe import FairResult as FairResult
+from .fair.recipe import FairRecipe as FairRecipe
 from .fair.recipe import minimise_normal_variation as minimise_normal_variation
 from .fair.settings import FairSettings as FairSettings
 from .form.prescribed_normals import prescribed_normals as prescribed_normals
@@ -8,6 +8,12 @@ from .form.recipe import FormResult as FormResult
 from .form.recipe import minimise_absolute_curvature as minimise_absolute_curvature
 from .form.settings import FormSettings as FormSettings
 from .form.start_surface import start_surface as start_surface
+from .job import JobResult as JobResult
+from .job import Level as Level
+from .job import Progress as Progress
+from .job import Promise as Promise
+from .job import Recipe as Recipe
+from .job import Session as Session
 from .symmetric.design import SymmetricDesign as SymmetricDesign
 from .symmetric.measures import condition_residuals as condition_residuals
 from .symmetric.measures import symmetric_measures as symmetric_measures

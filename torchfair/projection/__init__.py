@@ -18,5 +18,6 @@ from .settings import ProjectionSettings as ProjectionSettings
 from .state import ProjectionState as ProjectionState
 from .steps import finished as finished
 from .steps import init as init
+from .steps import resume as resume
 from .steps import step as step
 from .term import ElementTerm as ElementTerm

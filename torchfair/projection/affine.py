@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -31,6 +32,7 @@ class AffinePart:
     Attributes:
         offset: (rows,) b.
         jacobian: ``A`` with zero columns at fixed unknowns, a SciPy CSR matrix.
+        normal_matrix: ``A^T A``, zero at fixed unknowns, likewise.
     """
 
     def __init__(self, terms: Sequence[CompiledTerm], layout: Layout, free: Tensor, dtype: torch.dtype) -> None:
@@ -52,11 +54,25 @@ class AffinePart:
         self.offset, self._roots = torch.cat(offsets), torch.cat(roots)
         self._sizes = [offset.shape[0] for offset in offsets]
         self._matrix, self._whole = whole, self._to_torch(whole)
-        self.jacobian = whole
+        self._products = sp.csr_matrix(whole.T @ whole)
+        self._mask(free)
+
+    def with_free(self, free: Tensor) -> AffinePart:
+        """The same terms with other unknowns (N,) that may move."""
+        result = copy.copy(self)
+        result.__dict__.pop("diagonal", None)
+        result._mask(free)
+        return result
+
+    def _mask(self, free: Tensor) -> None:
+        """Makes columns of fixed unknowns zero; their places stay, so that they can be freed again."""
+        self.jacobian, self.normal_matrix = self._matrix, self._products
         if not bool(free.all()):
-            self.jacobian = whole.copy()
-            self.jacobian.data *= free.cpu().numpy()[whole.indices]
-            self.jacobian.eliminate_zeros()
+            moves = free.cpu().numpy()
+            self.jacobian, self.normal_matrix = self._matrix.copy(), self._products.copy()
+            self.jacobian.data *= moves[self._matrix.indices]
+            rows = np.repeat(np.arange(moves.size), np.diff(self._products.indptr))
+            self.normal_matrix.data *= moves[rows] & moves[self._products.indices]
         self._transpose = self._to_torch(sp.csr_matrix(self.jacobian.T))
 
     def _to_torch(self, matrix: sp.csr_matrix) -> Tensor:
@@ -102,11 +118,6 @@ class AffinePart:
         """``A^T r``, zero at fixed unknowns."""
         result: Tensor = self._transpose @ residual
         return result
-
-    @cached_property
-    def normal_matrix(self) -> sp.csr_matrix:
-        """``A^T A``, zero at fixed unknowns."""
-        return sp.csr_matrix(self.jacobian.T @ self.jacobian)
 
     @cached_property
     def diagonal(self) -> Tensor:

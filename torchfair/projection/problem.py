@@ -86,6 +86,24 @@ class Problem:
             result.solver = copy.copy(self.solver)  # each keeps the analysis of its own pattern
         return result
 
+    def with_fixed(self: _Problem, fixed: Mapping[str, Tensor]) -> _Problem:
+        """The same problem with other unknowns that stay as they are; index maps and analysis are kept.
+
+        Args:
+            fixed: Masks ``(n,)`` or ``(n, d)`` by block name; unknowns that are not named may all move.
+
+        Raises:
+            ShapeError: a mask does not fit its block.
+        """
+        free = self.layout.free_mask(fixed, self.layout.device)
+        if torch.equal(free, self.structure.free):
+            return self
+        result = copy.copy(self)
+        result._others = {}
+        with torch.no_grad():
+            result.structure = self.structure.with_free(free)
+        return result
+
     def batched(self, count: int) -> Problem:
         """The problems of ``count`` members with the same terms as one, see :class:`Layout`; kept for the next time.
 

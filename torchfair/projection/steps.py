@@ -108,6 +108,34 @@ def of_members(problem: Problem, state: ProjectionState, chosen: list[int]) -> t
 
 
 @_plain
+def resume(problem: Problem, state: ProjectionState, blocks: State | None = None) -> ProjectionState:
+    """The state from which a run goes on after data, weights or fixed unknowns of its problem have changed.
+
+    Damping, accuracy and stiffness are carried on; iterations are counted and convergence is tested anew. Nothing is
+    asked of the start; for that see :func:`init`.
+
+    Args:
+        problem: That of the state, with other data (``with_terms``, ``with_fixed``, or terms that refresh).
+        state: Not modified.
+        blocks: Where to go on, by default where the state is.
+
+    Example::
+
+        heavier = problem.with_terms(terms)
+        state, record = step(heavier, resume(heavier, state))
+    """
+    evaluation = problem.structure.evaluate(state.blocks if blocks is None else dict(blocks))
+    linearised, standings = _linearise(problem, evaluation, state.settings, state.linearised.stiffness)
+    courses = tuple(
+        Course(standing, before.damping, before.accuracy)
+        for standing, before in zip(standings, state.courses, strict=True)
+    )
+    inequalities = linearised.inequalities
+    kept = inequalities is not None and state.heeded is not None and inequalities.broken.shape == state.heeded.shape
+    return ProjectionState(evaluation, linearised, state.settings, courses, state.heeded if kept else None)
+
+
+@_plain
 def step(
     problem: Problem, state: ProjectionState, guard: Guard | None = None
 ) -> tuple[ProjectionState, IterationRecord]:

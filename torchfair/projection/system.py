@@ -56,7 +56,11 @@ class Structure:
         self.layout, self.free = layout, free
         self._take([CompiledTerm(term, layout) for term in self._checked(terms)], dtype)
         self._like = torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device)
-        self._free = [None if bool(free.all()) else free[c.unknowns] for c in self.compiled]
+        self._mask()
+
+    def _mask(self) -> None:
+        """Where the Jacobians of elements have columns of fixed unknowns."""
+        self._free = [None if bool(self.free.all()) else self.free[c.unknowns] for c in self.compiled]
 
     def _checked(self, terms: Sequence[ElementTerm]) -> list[ElementTerm]:
         for term in terms:
@@ -85,6 +89,19 @@ class Structure:
         result._take(compiled, self._like.dtype)
         pattern = self.__dict__.get("normal_pattern")
         if pattern is not None and pattern.fits(result.affine):
+            result.__dict__["normal_pattern"] = pattern.with_constant(result.affine)
+        return result
+
+    def with_free(self, free: Tensor) -> Structure:
+        """The structure with other unknowns (N,) that may move; index maps are kept."""
+        result = copy.copy(self)
+        result.free = free
+        for stale in ("normal_pattern", "block_diagonal", "_outputs"):
+            result.__dict__.pop(stale, None)
+        result.affine = None if self.affine is None else self.affine.with_free(free)
+        result._mask()
+        pattern = self.__dict__.get("normal_pattern")
+        if pattern is not None:
             result.__dict__["normal_pattern"] = pattern.with_constant(result.affine)
         return result
 

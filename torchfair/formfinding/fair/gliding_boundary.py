@@ -10,6 +10,7 @@ from ...constraints.gliding import CurveFeet
 from ...geometry.spline_curves import SplineCurves
 from ...projection.layout import State
 from ...topology import Topology
+from ..job.pulls import Pulls
 
 
 class GlidingBoundary:
@@ -22,7 +23,7 @@ class GlidingBoundary:
         vertices: (V, 3) where the curves go through.
         topology: Connectivity.
         corners: (V,) bool, boundary vertices at which curves end.
-        handles: (n,) vertices that are pulled elsewhere.
+        pulls: Vertices that are pulled elsewhere do not glide meanwhile.
         planar_faces: (n,) faces that are kept planar, which asks for more digits than that: in the mesh of a state
             their vertices are where the state has them.
 
@@ -32,11 +33,10 @@ class GlidingBoundary:
     """
 
     def __init__(
-        self, vertices: Tensor, topology: Topology, corners: Tensor, handles: Tensor, planar_faces: Tensor
+        self, vertices: Tensor, topology: Topology, corners: Tensor, pulls: Pulls, planar_faces: Tensor
     ) -> None:
         pieces = boundary_pieces(topology, corners)
-        self.held = topology.is_boundary_vertex.clone()
-        self.held[handles] = False
+        self._pulls, self.held = pulls, topology.is_boundary_vertex
         chosen = torch.nonzero(self.held & ~corners).squeeze(1)
         loose = topology.corners[torch.isin(topology.corner_faces, planar_faces)]
         self._loose = torch.isin(chosen, loose)[:, None]
@@ -54,12 +54,20 @@ class GlidingBoundary:
         if self.feet is None:
             return state["vertices"]
         points, chosen = state[self.feet.block], self.feet.vertices
-        places = torch.where(self._loose, points[chosen], self.feet(state).positions)
+        places = torch.where(self._loose | ~self.glides[:, None], points[chosen], self.feet(state).positions)
         return points.index_copy(0, chosen, places)
+
+    @property
+    def glides(self) -> Tensor:
+        """(n,) bool, those of the vertices on curves that glide now: neither pulled nor held."""
+        none = self.held.new_zeros(0)
+        return none if self.feet is None else ~(self._pulls.pulled | self._pulls.held)[self.feet.vertices]
 
     def distances(self, vertices: Tensor) -> Tensor:
         """(n,) distances of gliding vertices from their curves, for vertices (V, 3) of a mesh."""
-        return vertices.new_zeros(0) if self.feet is None else self.feet({self.feet.block: vertices}).distances
+        if self.feet is None:
+            return vertices.new_zeros(0)
+        return self.feet({self.feet.block: vertices}).distances[self.glides]
 
     def nearest(self, state: State, positions: Tensor, normals: Tensor) -> tuple[Tensor, Tensor]:
         """Closest points (V, 3) and unit normals (V, 3) of a surface, or those of curves where they are nearer.
@@ -70,7 +78,9 @@ class GlidingBoundary:
             return positions, normals
         found, chosen = self.feet(state), self.feet.vertices
         points = state[self.feet.block][chosen]
-        nearer = found.distances[:, None] < torch.linalg.vector_norm(points - positions[chosen], dim=1, keepdim=True)
+        nearer = self.glides[:, None] & (
+            found.distances[:, None] < torch.linalg.vector_norm(points - positions[chosen], dim=1, keepdim=True)
+        )
         away = (points - found.positions) / found.distances.clamp_min(1e-300)[:, None]
         towards = torch.where(nearer & (found.distances[:, None] > 1e-9), away, normals[chosen])
         places = torch.where(nearer, found.positions, positions[chosen])

@@ -1,54 +1,104 @@
-"""What the job that lowers E reports and guarantees."""
+"""What the job that lowers E reports and promises."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-import torch
 from torch import Tensor
 
-from ...energies import angle_variation, normal_variation, total_mean_curvature
+from ...energies import angle_variation, normal_variation, total_absolute_curvature, total_mean_curvature
 from ...geometry import corner_angles, face_areas, face_normals
+from ...geometry.closest_point import ReferenceSurface
 from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
-from ...topology import Topology
+from ..job.promises import Promise
 
 if TYPE_CHECKING:
     from .problem import FairProblem
 
+PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
+_HANDLE_REACHED = 0.05  # mean edge lengths
 
-def fair_measures(
-    vertices: Tensor, start: Tensor, topology: Topology, problem: FairProblem, normalisation: Normalisation
-) -> dict[str, float]:
-    """Energies and guaranteed quantities of one mesh.
+
+def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: Normalisation) -> dict[str, float]:
+    """Energies and promised quantities of one mesh (V, 3), against its start (V, 3), both in the unit of the input.
 
     Returns:
-        ``normal_variation``, ``angle_variation``, ``total_mean_curvature`` (length unit of the input);
-        ``mean_edge_length``; ``largest_distance`` from the reference surface and ``largest_distance_relative``
-        (in mean edges of the input), for vertices that glide on a boundary curve from the nearer of both;
-        ``largest_boundary_distance`` of gliding vertices from their curve; ``smallest_angle_degrees``;
-        ``smallest_area_ratio`` and ``flipped_faces`` against the start; ``largest_planarity`` of the faces kept planar
-        (diagonal distance over mean edge of the face); ``largest_handle_distance``.
+        ``normal_variation`` (E), ``angle_variation``, ``total_mean_curvature`` and ``total_absolute_curvature`` (C, the
+        floor of E, measured with the normal cycle), in the length unit of the input; ``energy_over_curvature``;
+        ``area``; ``mean_edge_length``. ``largest_distance`` of vertices from the reference surface and
+        ``largest_distance_relative`` (in mean edges of the input), for vertices that glide on a boundary curve from the
+        nearer of both; ``largest_distance_back`` from vertices of the reference surface to this one;
+        ``largest_boundary_distance`` of gliding vertices from their curve. ``smallest_angle_degrees``;
+        ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces`` against the start. ``largest_planarity``
+        of the faces kept planar and ``largest_planarity_of_all`` polygons (diagonal distance over mean edge of the
+        face). ``largest_handle_distance``.
     """
-    normalised = normalisation.apply(vertices)
+    topology = problem.topology
+    normalised = unit.apply(vertices)
     distances = problem.distances(normalised)[topology.valences > 0]
+    back = ReferenceSurface(normalised, topology).closest(problem.reference_points).distances
     ratios = face_areas(vertices, topology) / face_areas(start, topology)
     turned = (face_normals(vertices, topology) * face_normals(start, topology)).sum(1)
     strayed = vertices.new_zeros(0) if problem.boundary is None else problem.boundary.distances(normalised)
-    planar = planarity(vertices, topology)[problem.planar_faces]
-    pulled = normalisation.invert(problem.targets) - vertices[problem.handles]
+    warps = planarity(vertices, topology)
+    energy, curvature = (
+        float(quantity(vertices, topology)) for quantity in (normal_variation, total_absolute_curvature)
+    )
     return {
-        "normal_variation": float(normal_variation(vertices, topology)),
+        "normal_variation": energy,
         "angle_variation": float(angle_variation(vertices, topology)),
         "total_mean_curvature": float(total_mean_curvature(vertices, topology)),
+        "total_absolute_curvature": curvature,
+        "energy_over_curvature": energy / curvature if curvature > 0.0 else math.nan,
+        "area": float(face_areas(vertices, topology).sum()),
         "mean_edge_length": float(Normalisation.of(vertices, topology).length),
-        "largest_distance": normalisation.length * float(distances.max()),
+        "largest_distance": unit.length * float(distances.max()),
         "largest_distance_relative": float(distances.max()),
-        "largest_boundary_distance": normalisation.length * float(strayed.max()) if strayed.numel() else 0.0,
+        "largest_distance_back": unit.length * float(back.max()),
+        "largest_boundary_distance": unit.length * _largest(strayed),
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
         "smallest_area_ratio": float(ratios.min()),
+        "largest_area_ratio": float(ratios.max()),
         "flipped_faces": int((turned <= 0.0).sum()),
-        "largest_planarity": float(planar.max()) if planar.numel() else 0.0,
-        "largest_handle_distance": float(torch.linalg.vector_norm(pulled, dim=1).max()) if pulled.numel() else 0.0,
+        "largest_planarity": _largest(warps[problem.planar_faces]),
+        "largest_planarity_of_all": _largest(warps[topology.face_sizes > 3]),
+        "largest_handle_distance": unit.length * _largest(problem.pulls.away(normalised)),
     }
+
+
+def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
+    """What the settings ask of a mesh, and what its measures are."""
+    settings = problem.settings
+    promises = []
+    if not problem.has_other_goals:
+        promises.append(Promise("E", before["normal_variation"], after["normal_variation"]))
+    if problem.limits is not None and not problem.design_mode:
+        most = max(settings.distance_limit or 0.0, before["largest_distance_relative"])
+        reached = after["largest_distance_relative"]
+        remedy = "raise distance_limit, or pull less"
+        promises.append(Promise("distance from the reference", most, reached, unit="mean edges", remedy=remedy))
+    if settings.quality_weight:
+        least = min(math.degrees(settings.smallest_angle), before["smallest_angle_degrees"])
+        reached = after["smallest_angle_degrees"]
+        promises.append(Promise("smallest angle", least, reached, "at least", "degrees"))
+        area = after["smallest_area_ratio"]
+        promises.append(Promise("smallest area against its own", settings.smallest_area, area, "at least"))
+    if not problem.design_mode:
+        promises.append(Promise("faces turned over", 0.0, after["flipped_faces"]))
+    if problem.planar_faces.numel() and settings.planarity_weight:
+        remedy = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"
+        promises.append(Promise("planarity of kept faces", PLANAR_PROMISE, after["largest_planarity"], remedy=remedy))
+    if bool(problem.pulls.pulled.any()):
+        most = _HANDLE_REACHED * before["mean_edge_length"]
+        remedy = "faces would become too small or too thin; allow smaller angles and areas, or pull less"
+        promises.append(
+            Promise("distance of a handle from its target", most, after["largest_handle_distance"], remedy=remedy)
+        )
+    return promises
+
+
+def _largest(values: Tensor) -> float:
+    return float(values.max()) if values.numel() else 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cached_property
 
 import torch
@@ -15,10 +16,11 @@ from ...constraints.lifted_normal_variation import lifted_blocks, lifted_normal_
 from ...geometry import corner_angles, face_areas
 from ...geometry.closest_point import ReferenceSurface
 from ...geometry.planarity import planarity
-from ...projection import ElementTerm
+from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...topology import Topology
-from ..checks import refuse_degenerate_faces
+from ..job.plan import Stage
+from ..job.pulls import Pulls
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .planar_faces import faces_to_keep_planar
@@ -36,9 +38,21 @@ _MOST_STAGES = 20
 class FairProblem:
     """Everything guided projection needs to lower E of one normalised mesh.
 
+    Args:
+        vertices: (V, 3) start, normalised.
+        topology: Its connectivity.
+        reference: Surface to stay close to, normalised; by default the start.
+        pulls: Handles and held vertices.
+        settings: Weights and bounds.
+
     Attributes:
-        fixed: Masks of unknowns that do not move.
+        reference: As a surface with closest points.
+        reference_points: (n, 3) its vertices.
+        limits: (V,) largest distances from it; None for no limit.
+        has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
+        design_mode: Whether a handle is pulled off the reference surface, which is then given up.
         planar_faces: (n,) faces that are kept planar.
+        boundary: Curves on which boundary vertices glide; None if they do not.
         notes: Decisions taken, in words.
     """
 
@@ -47,44 +61,61 @@ class FairProblem:
         vertices: Tensor,
         topology: Topology,
         reference: tuple[Tensor, Topology] | None,
-        targets: dict[int, Tensor],
+        pulls: Pulls,
         settings: FairSettings,
     ) -> None:
-        self.vertices, self.topology, self.settings = vertices, topology, settings
+        self.vertices, self.topology, self.pulls, self.settings = vertices, topology, pulls, settings
         self.notes: list[str] = []
-        refuse_degenerate_faces(vertices, topology)
         self.reference = ReferenceSurface(*(reference or (vertices, topology)))
-        self._planes = TangentPlanes(self.reference)
-        self._other_goals = bool(targets) or reference is not None
-        self.handles = torch.tensor(list(targets), dtype=torch.int64)
-        self.targets = torch.stack(list(targets.values())) if targets else torch.zeros(0, 3, dtype=vertices.dtype)
-        self.design_mode = self._leaves_reference()
+        self.reference_points = (vertices if reference is None else reference[0])[
+            (topology if reference is None else reference[1]).valences > 0
+        ]
+        self._has_other_reference = reference is not None
+        self.forget()
+        self.design_mode = self.has_other_goals = False
         self.corners = boundary_corners(vertices, topology, settings.corner_angle)
-        self.fixed = {"vertices": self._fixed_vertices()[:, None].expand(-1, 3).clone()}
         self.planar_faces = self._planar_faces()
         self.boundary = self._gliding_boundary()
-        self._common = [
-            *self._closeness(),
-            *self._boundary(),
-            *c.interior_fairness_terms(topology, weight=settings.fairness_weight),
-            *self._quality(),
-        ]
+        self.limits = self._limits()
+
+    def reconsider(self) -> None:
+        """Takes in that handles are pulled elsewhere."""
+        before, self.design_mode = self.design_mode, self._leaves_reference()
+        self.has_other_goals = bool(self.pulls.pulled.any()) or self._has_other_reference
+        self.pulls.version += before != self.design_mode
+        self.__dict__.pop("_guard", None)
+
+    def forget(self) -> None:
+        """Makes searches for closest points anew."""
+        self._planes = TangentPlanes(self.reference)
 
     # ---- stages ----------------------------------------------------------------------------------------
 
-    def shares(self) -> list[float]:
-        """How far the constraints that the start violates are imposed, stage after stage; the last is 1.
+    def stage(self, state: State, share: float, blur: float, settings: ProjectionSettings) -> Stage:
+        """A run of guided projection from ``state`` on; for the others see :meth:`terms`."""
+        return Stage(
+            name="fair",
+            blocks=state,
+            terms=lambda: self.terms(share, blur),
+            version=(self.pulls.version, share, blur),
+            settings=settings,
+            fixed={"vertices": (self.stays() | self.pulls.held)[:, None].expand(-1, 3).contiguous()},
+            guard=self.admits,
+        )
+
+    def shares(self, vertices: Tensor) -> list[float]:
+        """How far the constraints that the ``vertices`` (V, 3) violate are imposed, stage after stage; the last is 1.
 
         Handles move on in small portions and planarity is raised by powers of ten, so that the barriers
         around badly shaped faces are never asked to hold against a sudden pull.
         """
-        pulled = torch.linalg.vector_norm(self.targets - self.vertices[self.handles], dim=1)
+        pulled = self.pulls.away(vertices)
         steps = math.ceil(float(pulled.max()) / _LONGEST_PULL) if pulled.numel() else 1
-        warped = planarity(self.vertices, self.topology)[self.planar_faces]
+        warped = planarity(vertices, self.topology)[self.planar_faces]
         if warped.numel() and float(warped.max()) > _LARGEST_WARP:
             steps = max(steps, _PLANARITY_STAGES)
-        steps = min(steps, _MOST_STAGES)
-        self._other_goals = self._other_goals or steps > 1
+        steps = max(1, min(steps, _MOST_STAGES))
+        self.has_other_goals = self.has_other_goals or steps > 1
         return [(i + 1) / steps for i in range(steps)]
 
     def terms(self, share: float, blur: float = 1.0) -> list[ElementTerm]:
@@ -95,12 +126,14 @@ class FairProblem:
             blur: Factor of the smoothing of the absolute value.
         """
         settings = self.settings
-        targets = self.vertices[self.handles].lerp(self.targets, min(share, 1.0))
         planarity_weight = max(settings.planarity_weight, 1.0) ** share if settings.planarity_weight else 0.0
         return [
             *self._energy(blur),
-            *self._common,
-            *c.handle_terms(self.handles, targets, weight=settings.handle_weight),
+            *self._closeness(),
+            *self._boundary(),
+            *c.interior_fairness_terms(self.topology, weight=settings.fairness_weight),
+            *self._quality(),
+            *self.pulls.terms(weight=settings.handle_weight),
             *c.planarity_terms(self.topology, self.planar_faces, weight=planarity_weight),
         ]
 
@@ -118,19 +151,22 @@ class FairProblem:
     # ---- decisions -------------------------------------------------------------------------------------
 
     def _leaves_reference(self) -> bool:
-        limit = self.settings.distance_limit
-        if not self.handles.numel() or limit is None:
+        limit, handles = self.settings.distance_limit, self.pulls.vertices
+        if not handles.numel() or limit is None:
             return False
-        farthest = float(self.reference.closest(self.targets).distances.max())
+        farthest = float(self.reference.closest(self.pulls.targets[handles]).distances.max())
         if farthest <= limit:
             return False
+        if self.design_mode:
+            return True
         self.notes.append(
             f"a handle pulls {farthest:.3g} mean edge lengths off the reference surface: closeness and the "
             "distance limit are switched off (design mode)"
         )
         return True
 
-    def _fixed_vertices(self) -> Tensor:
+    def stays(self) -> Tensor:
+        """(V,) bool, vertices that do not move: the boundary or its corners, unless they are pulled; isolated ones."""
         isolated = self.topology.valences == 0
         kinds = {
             "glide": self.topology.is_boundary_vertex & self.corners,
@@ -138,8 +174,7 @@ class FairProblem:
             "free": torch.zeros_like(isolated),
         }
         fixed = kinds[self.settings.boundary] | isolated
-        fixed[self.handles] = False
-        return fixed
+        return fixed & ~self.pulls.pulled
 
     def _planar_faces(self) -> Tensor:
         faces = faces_to_keep_planar(self.vertices, self.topology, self.settings)
@@ -165,20 +200,29 @@ class FairProblem:
         )
 
     def _closeness(self) -> list[ElementTerm]:
-        if self.design_mode:
+        settings, used = self.settings, self.topology.valences > 0
+        if self.design_mode and not self.pulls.everywhere:
             return []
-        used = self.topology.valences > 0
-        close = used if self.boundary is None else used & ~self.boundary.held
-        chosen = torch.nonzero(close).squeeze(1)
-        terms = c.closeness_terms(self._planes, chosen, weight=self.settings.closeness_weight)
-        if self.settings.distance_limit is not None:
-            distances = self.distances(self.vertices)
-            limits = distances.clamp_min(self.settings.distance_limit) * (1.0 + 1e-9)  # rounding at the start
-            far = int((distances > self.settings.distance_limit)[used].sum())
-            if far:
-                self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")
-            terms += c.distance_limit_terms(self._nearest, limits, weight=self.settings.quality_weight)
-        return terms
+        close = used if self.boundary is None else used & ~(self.boundary.held & ~self.pulls.pulled)
+        chosen = torch.nonzero(used if self.pulls.everywhere else close).squeeze(1)
+        (term,) = c.closeness_terms(self._planes, chosen, weight=settings.closeness_weight)
+        terms = [replace(term, element_weights=close[chosen].to(self.vertices)) if self.pulls.everywhere else term]
+        if self.limits is not None:
+            terms += c.distance_limit_terms(self._nearest, self.limits, weight=settings.quality_weight)
+        if not self.design_mode:
+            return terms
+        return [replace(term, element_weights=self.vertices.new_zeros(term.num_elements)) for term in terms]
+
+    def _limits(self) -> Tensor | None:
+        """(V,) largest distances from the reference that are allowed."""
+        limit = self.settings.distance_limit
+        if limit is None:
+            return None
+        distances = self.distances(self.vertices)
+        far = int((distances > limit)[self.topology.valences > 0].sum())
+        if far:
+            self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")
+        return distances.clamp_min(limit) * (1.0 + 1e-9)  # rounding at the start
 
     def _nearest(self, state: State) -> tuple[Tensor, Tensor]:
         """Planes from which distances are measured: of gliding vertices from the surface or from their curve."""
@@ -194,7 +238,7 @@ class FairProblem:
     def _gliding_boundary(self) -> GlidingBoundary | None:
         if self.settings.boundary != "glide":
             return None
-        return GlidingBoundary(self.vertices, self.topology, self.corners, self.handles, self.planar_faces)
+        return GlidingBoundary(self.vertices, self.topology, self.corners, self.pulls, self.planar_faces)
 
     def _boundary(self) -> list[ElementTerm]:
         if self.boundary is None:
@@ -202,7 +246,9 @@ class FairProblem:
         fairness = c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight)
         if self.boundary.feet is None:
             return fairness
-        return [*c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight), *fairness]
+        gliding = c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight)
+        weights = self.boundary.glides.to(self.vertices)
+        return [*(replace(term, element_weights=weights) for term in gliding), *fairness]
 
     def _quality(self) -> list[ElementTerm]:
         settings = self.settings
@@ -234,7 +280,7 @@ class FairProblem:
         E may rise where handles, another reference or planarity ask for a different shape.
         """
         kept = self._guard.keeps_faces(state, trial) and self._guard.keeps_bounds(trial)
-        return kept and (self._other_goals or self._guard.keeps_energy(trial))
+        return kept and (self.has_other_goals or self._guard.keeps_energy(trial))
 
     @cached_property
     def _guard(self) -> FairGuard:
@@ -245,5 +291,5 @@ class FairProblem:
             self.placed,
             smallest_angle=bounded * self._smallest_angle,
             smallest_area=bounded * self.settings.smallest_area,
-            from_last=self.design_mode,
+            from_last=self.design_mode or self.pulls.everywhere,
         )

@@ -3,51 +3,93 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
 
-import torch
 from torch import Tensor
 
-from ..._interrupts import deferred_interrupts
 from ...energies import normal_variation
-from ...normalisation import Normalisation
-from ...projection import Callback, ProjectionResult
+from ...projection import Callback
 from ...projection.layout import State
 from ...topology import Topology
 from ..checks import one_start
-from ..handles import read_handles
-from ..stopping import interrupted
-from .measures import fair_measures
+from ..job import JobResult, Level, Promise, Recipe, Stage, solved
+from .measures import fair_measures, fair_promises
+from .plan import FairPlan
 from .problem import FairProblem
 from .settings import FairSettings
-from .stages import FairStages
 
 Mesh = tuple[Tensor, Topology]
 
-_HANDLE_REACHED = 0.05  # mean edge lengths
 
+class FairRecipe(Recipe[FairSettings]):
+    """Lowers E near a reference surface; see :func:`minimise_normal_variation`.
 
-@dataclass(frozen=True)
-class FairResult:
-    """A mesh of lower E.
-
-    Attributes:
-        vertices: (V, 3) in the unit and dtype of the input.
-        projection: Status, history and residual table of the iteration, in normalised units
-            (energies in the history are in the unit of the input).
-        preparation: Earlier stages: with a blunter absolute value, and where handles travel far or faces have to
-            become planar, with constraints imposed step by step. The merit falls within each stage.
-        before, after: Energies and the quantities that the job guarantees, see ``fair_measures``.
-        notes: What the job decided on its own, in words.
+    Args:
+        vertices, topology, reference, settings: See :func:`minimise_normal_variation`.
+        handles: Likewise; more of them may be pulled later.
     """
 
-    vertices: Tensor
-    projection: ProjectionResult
-    preparation: list[ProjectionResult]
-    before: dict[str, float]
-    after: dict[str, float]
-    notes: list[str]
+    name = "fair"
+
+    def __init__(
+        self,
+        vertices: Tensor,
+        topology: Topology,
+        *,
+        reference: Mesh | None = None,
+        handles: Mapping[int, Sequence[float]] | None = None,
+        settings: FairSettings | None = None,
+    ) -> None:
+        super().__init__(vertices, topology, settings or FairSettings())
+        surface = None if reference is None else (self.unit.apply(one_start(*reference)), reference[1].to("cpu"))
+        self.problem = FairProblem(self.start, self.topology, surface, self.pulls, self.settings)
+        self.notes = self.problem.notes
+        self.pull(handles or {})
+
+    def take_settings(self, settings: FairSettings) -> None:
+        """Takes other weights."""
+        super().take_settings(settings)
+        self.problem.settings = settings
+
+    def pull(self, places: Mapping[int, Sequence[float]]) -> None:
+        """See the base class; where a handle leaves the reference surface, that is given up."""
+        super().pull(places)
+        self.problem.reconsider()
+
+    def plan(self, state: State) -> FairPlan:
+        """Constraints in portions, then the absolute value sharper and sharper."""
+        return FairPlan(self.problem, state)
+
+    def follower(self, state: State) -> Stage:
+        """Everything at once, with the sharp absolute value."""
+        return self.problem.stage(state, 1.0, 1.0, self.settings.projection)
+
+    def state(self) -> State:
+        """The start, with auxiliary variables that fit it."""
+        return self.problem.blocks(self.start)
+
+    def placed(self, state: State) -> Tensor:
+        """Gliding vertices are put on their curves."""
+        return self.problem.placed(state)
+
+    def observe(self, state: State) -> dict[str, float]:
+        """E, in the unit of the input."""
+        return {"normal_variation": self.unit.length * float(normal_variation(self.placed(state), self.topology))}
+
+    def stays(self) -> Tensor:
+        """Boundary vertices or corners, as the settings say, unless they are pulled."""
+        return self.problem.stays()
+
+    def forget(self) -> None:
+        """Searches for closest points begin anew."""
+        self.problem.forget()
+
+    def measures(self, vertices: Tensor) -> dict[str, float]:
+        """See ``fair_measures``."""
+        return fair_measures(vertices, self.given, self.problem, self.unit)
+
+    def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
+        """See ``fair_promises``."""
+        return fair_promises(self.problem, before, after)
 
 
 def minimise_normal_variation(
@@ -58,15 +100,16 @@ def minimise_normal_variation(
     handles: Mapping[int, Sequence[float]] | None = None,
     settings: FairSettings | None = None,
     callback: Callback | None = None,
-) -> FairResult:
+) -> JobResult[Level]:
     """Moves vertices along a reference surface so that E = sum l l* becomes small.
 
-    Works on triangle, quad and hybrid polygon meshes, with or without boundary. Guarantees at every step:
-    the merit never increases, nor does E above its start (unless handles, another reference or planarity
-    ask for a different shape); no vertex goes farther from the reference surface than
-    ``settings.distance_limit`` (gliding boundary vertices are on smooth curves through the boundary, which bulge over
-    its chords); no corner angle and no face area falls below its bound; no face flips. The
-    problem is solved centred and with unit mean edge length, so results do not depend on the unit.
+    Works on triangle, quad and hybrid polygon meshes, with or without boundary. Promises, which are measured on the
+    result (:attr:`~torchfair.formfinding.JobResult.promises`): the merit never increases within a stage, nor does E
+    above its start (unless handles, another reference or planarity ask for a different shape); no vertex goes farther
+    from the reference surface than ``settings.distance_limit`` (gliding boundary vertices are on smooth curves through
+    the boundary, which bulge over its chords); no corner angle and no face area falls below its bound; no face flips;
+    faces that are kept planar are. The problem is solved centred and with unit mean edge length, so results do not
+    depend on the unit.
 
     Args:
         vertices: (V, 3).
@@ -79,71 +122,21 @@ def minimise_normal_variation(
         callback: Called with every iteration record, whose quantities hold ``normal_variation``; returning
             True stops. Ctrl-C, or a function that raises KeyboardInterrupt, returns the best mesh so far.
 
+    Returns:
+        One level. Its last run is that with the sharp absolute value; the others, if any, are stages with a blunter
+        one, and where handles travel far or faces have to become planar, with constraints imposed step by step.
+
     Raises:
         ShapeError: vertices are not ``(V, 3)``, or a handle is not a point.
         MeshError: vertices are not finite, a face has no area, or a handle is no vertex.
+
+    Example::
+
+        result = minimise_normal_variation(vertices, topology)
+        print(result.before["normal_variation"], result.after["normal_variation"], result.holds)
     """
-    with deferred_interrupts() as interrupts:
-        job = interrupts.insist(_Job.of, vertices, topology, reference, handles, settings or FairSettings())
-        runs, cut = interrupts.collect(lambda: FairStages(job.problem, callback, job.observe))
-        if cut:
-            runs[-1] = interrupted(runs[-1])
-        return interrupts.insist(job.result, vertices, runs)
 
+    def begin() -> FairRecipe:
+        return FairRecipe(vertices, topology, reference=reference, handles=handles, settings=settings)
 
-class _Job(NamedTuple):
-    """The job with its problem in normalised units; ``start`` is in those of the input."""
-
-    start: Tensor
-    topology: Topology
-    normalisation: Normalisation
-    problem: FairProblem
-
-    @classmethod
-    def of(
-        cls,
-        vertices: Tensor,
-        topology: Topology,
-        reference: Mesh | None,
-        handles: Mapping[int, Sequence[float]] | None,
-        settings: FairSettings,
-    ) -> _Job:
-        start, topology = one_start(vertices, topology), topology.to("cpu")
-        normalisation = Normalisation.of(start, topology)
-        pulled, targets = read_handles(handles or {}, topology)
-        problem = FairProblem(
-            normalisation.apply(start),
-            topology,
-            None
-            if reference is None
-            else (normalisation.apply(reference[0].detach().to("cpu", torch.float64)), reference[1]),
-            dict(zip(pulled.tolist(), normalisation.apply(targets), strict=True)),
-            settings,
-        )
-        return cls(start, topology, normalisation, problem)
-
-    def observe(self, state: State) -> dict[str, float]:
-        """What the history holds."""
-        energy = float(normal_variation(self.problem.placed(state), self.topology))
-        return {"normal_variation": self.normalisation.length * energy}
-
-    def result(self, vertices: Tensor, runs: list[ProjectionResult]) -> FairResult:
-        """The mesh after all runs, in the dtype and on the device of the input ``vertices``, and its measures."""
-        start, topology, normalisation, problem = self
-        state = problem.placed(runs[-1].blocks)
-        moved = torch.where(problem.fixed["vertices"], start, normalisation.invert(state))
-        after = fair_measures(moved, start, topology, problem, normalisation)
-        notes = list(problem.notes)
-        if after["largest_handle_distance"] > _HANDLE_REACHED * normalisation.length:
-            notes.append(
-                f"a handle ends {after['largest_handle_distance']:.3g} from its target: faces would become too small "
-                "or too thin; allow smaller angles and areas, or pull less"
-            )
-        return FairResult(
-            vertices=moved.to(vertices),
-            projection=runs[-1],
-            preparation=runs[:-1],
-            before=fair_measures(start, start, topology, problem, normalisation),
-            after=after,
-            notes=notes,
-        )
+    return solved(begin, vertices, callback=callback)

@@ -1,0 +1,55 @@
+"""What a job promises, measured on what it made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A bound that a result was asked to keep.
+
+    Attributes:
+        name: What is bounded, in words.
+        asked: The bound.
+        reached: What the result has.
+        sense: ``"at most"`` or ``"at least"``.
+        unit: Of both numbers, empty where there is none.
+        remedy: What to change where it does not hold.
+        slack: Relative allowance for rounding.
+    """
+
+    name: str
+    asked: float
+    reached: float
+    sense: Literal["at most", "at least"] = "at most"
+    unit: str = ""
+    remedy: str = ""
+    slack: float = 1e-6
+
+    @property
+    def holds(self) -> bool:
+        """Whether the result keeps the bound; False where it is no number."""
+        allowance = self.slack * abs(self.asked)
+        if self.sense == "at most":
+            return self.reached <= self.asked + allowance
+        return self.reached >= self.asked - allowance
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        words = f"{self.name} {self.reached:.3g}{unit}, {self.sense} {self.asked:.3g} asked for"
+        if self.holds:
+            return words
+        return f"{words}: NOT REACHED" + (f"; {self.remedy}" if self.remedy else "")
+
+    def as_dict(self) -> dict[str, object]:
+        """For reports."""
+        return {
+            "name": self.name,
+            "asked": self.asked,
+            "reached": self.reached,
+            "sense": self.sense,
+            "unit": self.unit,
+            "holds": self.holds,
+        }

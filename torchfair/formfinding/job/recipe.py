@@ -1,0 +1,164 @@
+"""What a job is: the one thing that has to be written for a new one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar, Generic, Protocol, TypeVar
+
+import torch
+from torch import Tensor
+
+from ...errors import MeshError
+from ...normalisation import Normalisation
+from ...projection import ProjectionResult, ProjectionSettings
+from ...projection.layout import State
+from ...topology import Topology
+from ..checks import one_start, refuse_degenerate_faces
+from ..handles import read_handles
+from .plan import OneStage, Plan, Stage
+from .promises import Promise
+from .pulls import Pulls
+from .result import Level
+
+
+class JobSettings(Protocol):
+    """What the settings of every job have."""
+
+    @property
+    def projection(self) -> ProjectionSettings:
+        """Iterations, tolerances, damping and linear solver; the time limit is that of a whole solve."""
+
+
+S = TypeVar("S", bound=JobSettings)
+
+
+class Recipe(ABC, Generic[S]):
+    """A job on one mesh: what is asked of it and what is promised.
+
+    Everything is solved centred and with unit mean edge length, so that weights are dimensionless and results do not
+    depend on the unit of the input.
+
+    Args:
+        vertices: (V, 3) start.
+        topology: Its connectivity.
+        settings: Weights, bounds and tolerances.
+
+    Attributes:
+        name: Of the job, a word.
+        given: (V, 3) start as float64, in the unit of the input.
+        start: (V, 3) the same, normalised.
+        unit: Between both.
+        pulls: Handles and held vertices.
+        notes: Decisions taken, in words.
+
+    Raises:
+        ShapeError: vertices are not ``(V, 3)``.
+        MeshError: vertices are not finite, or a face has no area.
+    """
+
+    name: ClassVar[str]
+    refuses_degenerate: ClassVar[bool] = True
+
+    def __init__(self, vertices: Tensor, topology: Topology, settings: S) -> None:
+        self.given, self.topology = one_start(vertices, topology), topology.to("cpu")
+        self.settings = settings
+        self.unit = Normalisation.of(self.given, self.topology)
+        if self.refuses_degenerate:
+            refuse_degenerate_faces(self.given, self.topology)
+        self.start = self.unit.apply(self.given)
+        self.pulls = Pulls(self.start)
+        self.notes: list[str] = []
+
+    # ---- what is solved --------------------------------------------------------------------------------
+
+    @abstractmethod
+    def plan(self, state: State) -> Plan:
+        """The whole job, from a state on."""
+
+    @abstractmethod
+    def follower(self, state: State) -> Stage:
+        """What one step of a live session lowers, from a state on."""
+
+    def settling(self, state: State) -> Plan:
+        """What a live session does once handles are let go, by default what its steps do, to the end."""
+        return OneStage(self.follower(state))
+
+    def state(self) -> State:
+        """Variable blocks at the start."""
+        return {"vertices": self.start}
+
+    def placed(self, state: State) -> Tensor:
+        """The vertices (V, 3) of the mesh of a state."""
+        return state["vertices"]
+
+    def observe(self, state: State) -> dict[str, float]:
+        """What the history holds of a state; lengths in the unit of the input."""
+        return {}
+
+    def stays(self) -> Tensor:
+        """(V,) bool, vertices that the job itself does not move."""
+        return self.topology.valences == 0
+
+    @property
+    def fixed(self) -> dict[str, Tensor]:
+        """Mask of the unknowns of vertices that do not move."""
+        return {"vertices": (self.stays() | self.pulls.held)[:, None].expand(-1, 3).contiguous()}
+
+    def take_settings(self, settings: S) -> None:
+        """Other weights, of the same kind."""
+        self.settings = settings
+        self.pulls.version += 1
+
+    # ---- handles ---------------------------------------------------------------------------------------
+
+    def pull(self, places: Mapping[int, Sequence[float]]) -> None:
+        """Pulls vertices to places in the unit of the input.
+
+        Raises:
+            ShapeError: a target is not a point with finite coordinates.
+            MeshError: a handle is no vertex, or one that does not move.
+        """
+        vertices, targets = read_handles(places, self.topology)
+        self.check_pulls(vertices, targets)
+        self.pulls.pull(vertices, self.unit.apply(targets))
+
+    def check_pulls(self, vertices: Tensor, targets: Tensor) -> None:
+        """Refuses handles (n,) with targets (n, 3), in the unit of the input, that cannot be reached."""
+
+    # ---- what comes of it ------------------------------------------------------------------------------
+
+    def vertices(self, state: State) -> Tensor:
+        """(V, 3) of a state in the unit of the input; those that have not moved are exactly as given."""
+        placed = self.placed(state)
+        return torch.where((placed == self.start).all(1, keepdim=True), self.given, self.unit.invert(placed))
+
+    @abstractmethod
+    def measures(self, vertices: Tensor) -> dict[str, float]:
+        """Energies and what is promised, of vertices (V, 3) in the unit of the input."""
+
+    def before(self) -> dict[str, float]:
+        """Measures of what the job was given."""
+        return self.measures(self.given)
+
+    def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
+        """What was asked for and what was reached, from measures."""
+        return []
+
+    def level(self, state: State, before: dict[str, float], runs: list[ProjectionResult], like: Tensor) -> Level:
+        """What is returned of a state, in the dtype and on the device of ``like``."""
+        vertices = self.vertices(state)
+        after = self.measures(vertices)
+        promises = self.promises(before, after)
+        return Level(vertices.to(like), self.topology, before, after, runs, promises)
+
+    def refined(self, state: State) -> Recipe[S]:
+        """The same job on a refinement of the mesh of a state."""
+        raise MeshError(f"the job '{self.name}' works on one mesh and does not refine it")
+
+    def snapshot(self) -> Callable[[], None]:
+        """A function that puts back what runs change in the job itself, beside pulls and settings."""
+        return lambda: None
+
+    def forget(self) -> None:
+        """Forgets what may not be whole after an interruption, such as searches for closest points."""

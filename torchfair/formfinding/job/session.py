@@ -1,0 +1,347 @@
+"""A job that can be steered while it goes on: handles move, weights change, the mesh follows."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar, cast
+
+import torch
+from torch import Tensor
+
+from ..._interrupts import deferred_interrupts
+from ..._threads import threads_for
+from ...errors import MeshError, SettingsError
+from ...projection import (
+    Callback,
+    GuidedProjection,
+    IterationRecord,
+    ProjectionResult,
+    ProjectionState,
+    Status,
+    finished,
+    init,
+    resume,
+    step,
+)
+from ...projection.layout import State
+from ...projection.stopwatch import Stopwatch
+from ..stopping import interrupted, stopped
+from .plan import Plan, Stage
+from .recipe import Recipe
+
+R = TypeVar("R", bound=Recipe[Any])
+
+_MOST_TRIALS = 12  # damped steps that are refused before a live step gives up for now
+_ENDLESS = 10**9
+_LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one live step
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a live step did.
+
+    Attributes:
+        accepted: Whether the mesh has moved.
+        reason: Why it has not; empty if it has.
+        record: Of the last damped step; None if none was needed.
+        trials: Damped steps tried.
+    """
+
+    accepted: bool
+    reason: str
+    record: IterationRecord | None
+    trials: int
+
+
+@dataclass
+class _Following:
+    """Where live steps stand."""
+
+    stage: Stage
+    problem: GuidedProjection
+    state: ProjectionState
+
+
+class Session(Generic[R]):
+    """One mesh of a job, compiled for the next move.
+
+    :meth:`solve` does the whole job from where the mesh is. Between :meth:`move` and :meth:`settle`, each
+    :meth:`step` is one accepted damped step, with everything carried on from the step before: the mesh follows a handle
+    that is dragged.
+
+    Args:
+        recipe: The job.
+        callback: Called with every iteration record; returning True stops a solve.
+        live: Whether handles may be added later without new index maps.
+
+    Attributes:
+        state: The blocks found so far, normalised.
+        runs: Every run of guided projection so far.
+
+    Example::
+
+        session = Session(FairRecipe(vertices, topology), live=True)
+        session.move({17: (0.1, 0.0, 0.4)})
+        while session.step().accepted:
+            show(session.vertices)
+        session.settle()
+    """
+
+    def __init__(self, recipe: R, *, callback: Callback | None = None, live: bool = False) -> None:
+        self.recipe, self.callback = recipe, callback
+        recipe.pulls.everywhere = live
+        self.state: State = recipe.state()
+        self.runs: list[ProjectionResult] = []
+        self._problems: dict[str, tuple[object, GuidedProjection]] = {}
+        self._following: _Following | None = None
+        self._moved = False
+
+    # ---- what it is ------------------------------------------------------------------------------------
+
+    @property
+    def vertices(self) -> Tensor:
+        """(V, 3) float64, in the unit of the input."""
+        return self.recipe.vertices(self.state)
+
+    def measures(self) -> dict[str, float]:
+        """Energies and what the job promises, of the mesh as it is."""
+        return self.recipe.measures(self.vertices)
+
+    # ---- steering --------------------------------------------------------------------------------------
+
+    def move(self, places: Mapping[int, Sequence[float]]) -> None:
+        """Pulls vertices to places, in the unit of the input; vertices that were no handles become some.
+
+        Raises:
+            ShapeError: a target is not a point with finite coordinates.
+            MeshError: a handle is no vertex, or one that does not move.
+        """
+        self.recipe.pull(places)
+        self._moved = True
+
+    def hold(self, vertices: Iterable[int]) -> None:
+        """Keeps vertices where they are, from now on."""
+        self.recipe.pulls.hold(self._numbers(vertices))
+        self._moved = True
+
+    def free(self, vertices: Iterable[int]) -> None:
+        """Lets vertices go that were pulled or held."""
+        self.recipe.pulls.free(self._numbers(vertices))
+        self._moved = True
+
+    def weigh(self, **weights: float) -> None:
+        """Changes weights of the settings by their names, such as ``fairness=0.1``; index maps and analysis are kept.
+
+        Raises:
+            SettingsError: there is no such weight, or it is negative or not finite.
+        """
+        settings = self.recipe.settings
+        known = [name.removesuffix("_weight") for name in vars(settings) if name.endswith("_weight")]
+        wrong = sorted(weights.keys() - set(known))
+        if wrong:
+            raise SettingsError(f"weights of this job are {', '.join(sorted(known))}, got {', '.join(wrong)}")
+        changed = {f"{name}_weight": value for name, value in weights.items()}
+        self.recipe.take_settings(replace(settings, **changed))
+        self._moved = True
+
+    def _numbers(self, vertices: Iterable[int]) -> Tensor:
+        chosen, count = list(vertices), self.recipe.topology.num_vertices
+        wrong = [vertex for vertex in chosen if not 0 <= vertex < count]
+        if wrong:
+            raise MeshError(f"vertices are numbered 0 to {count - 1}, got {wrong[:5]}")
+        return torch.tensor(chosen, dtype=torch.int64)
+
+    # ---- live ------------------------------------------------------------------------------------------
+
+    def step(self) -> Progress:
+        """One accepted damped step, or the reason why there is none.
+
+        Interrupted, or where the callback raises an error, the mesh is as it was.
+        """
+        recipe = self.recipe
+        recipe.pulls.aim_near(recipe.placed(self.state), _LONGEST_PULL)
+        with torch.no_grad(), threads_for(recipe.start.numel(), recipe.start.device):
+            following = self._follow()
+            state, record = following.state, None
+            for trial in range(_MOST_TRIALS + 1):
+                status = finished(state)
+                if status is not None or trial == _MOST_TRIALS:
+                    following.state = state
+                    return Progress(False, _reason(status), record, trial)
+                state, record = step(following.problem, state, following.stage.guard)
+                if record.accepted:
+                    break
+            if self.callback is not None and record is not None:
+                self.callback(record)
+        following.state, self.state = state, following.stage.result(state.blocks)
+        self._moved = bool((recipe.pulls.aims != recipe.pulls.targets).any())
+        return Progress(True, "", record, trial + 1)
+
+    def _follow(self) -> _Following:
+        """The compiled problem of live steps and where they stand, with what has changed taken in."""
+        known = self._following
+        if known is not None and not self._moved:
+            return known
+        stage = self.recipe.follower(self.state)
+        stage = replace(stage, settings=replace(stage.settings, max_iterations=_ENDLESS, when_settled="stop"))
+        problem = self._compiled(stage)
+        if known is None:
+            state = init(problem, stage.blocks, replace(stage.settings, solver="auto"))
+        else:
+            state = resume(problem, known.state)
+        self._following = _Following(stage, problem, state)
+        return self._following
+
+    def settle(self) -> bool:
+        """Brings the mesh to rest; whether someone stopped it."""
+        return self._edited(self.recipe.settling)
+
+    # ---- whole -----------------------------------------------------------------------------------------
+
+    def solve(self) -> bool:
+        """Does the whole job from where the mesh is; whether someone stopped it.
+
+        The best state found is kept, also after Ctrl-C. Where a callback raises an error, everything is as it was.
+        """
+        return self._edited(self.recipe.plan)
+
+    def _edited(self, begin: Callable[[State], Plan]) -> bool:
+        with deferred_interrupts() as interrupts:
+            snapshot = interrupts.insist(self.snapshot)
+            watch, before = Stopwatch(), len(self.runs)
+            plans: list[Plan] = []
+
+            def runs() -> Iterator[ProjectionResult]:
+                plans[:] = [begin(self.state)]
+                return self._carried_out(plans[0], watch)
+
+            try:
+                with torch.no_grad(), threads_for(self.recipe.start.numel(), self.recipe.start.device):
+                    made, cut = interrupts.collect(runs)
+                    if cut:
+                        made[-1] = interrupted(made[-1])
+                    best = interrupts.insist(plans[0].best)
+            except BaseException as error:
+                self.restore(snapshot)
+                if not isinstance(error, Exception):
+                    self.forget_compiled()
+                raise
+            self.state, self.runs = best, [*self.runs[:before], *made]
+            self._following, self._moved = None, True
+            if made and made[-1].status is Status.INTERRUPTED:
+                self.forget_compiled()
+        return bool(made) and self._ended(made[-1], watch)
+
+    def _carried_out(self, plan: Plan, watch: Stopwatch) -> Iterator[ProjectionResult]:
+        """The runs of a plan, until its end or until someone stops one."""
+        stages = plan.stages()
+        stage = next(stages, None)
+        while stage is not None:
+            run = self._run(stage, watch)
+            plan.state = stage.result(run.blocks)
+            yield run
+            if self._ended(run, watch):
+                return
+            try:
+                stage = stages.send(run)
+            except StopIteration:
+                return
+
+    def _run(self, stage: Stage, watch: Stopwatch) -> ProjectionResult:
+        limit, settings = self.recipe.settings.projection.time_limit, stage.settings
+        if limit is not None:
+            settings = replace(settings, time_limit=max(0.0, limit - watch.elapsed))
+        return self._compiled(stage).solve(
+            stage.blocks,
+            settings=replace(settings, solver="auto"),
+            callback=self.callback,
+            observe=lambda state: self.recipe.observe(stage.result(state)),
+            guard=stage.guard,
+        )
+
+    def _ended(self, run: ProjectionResult, watch: Stopwatch) -> bool:
+        limit = self.recipe.settings.projection.time_limit
+        late = run.status is Status.TIME_LIMIT or (limit is not None and watch.elapsed > limit)
+        return stopped(run) or late
+
+    # ---- compiled problems -----------------------------------------------------------------------------
+
+    def _compiled(self, stage: Stage) -> GuidedProjection:
+        """The problem of a stage, with the index maps and the analysis of the last one of its name."""
+        version, problem = self._problems.get(stage.name, (None, None))
+        if problem is None or stage.anew:
+            problem = GuidedProjection(stage.blocks, stage.terms(), fixed=stage.fixed, solver=stage.settings.solver)
+        else:
+            if version != stage.version:
+                problem = problem.with_terms(stage.terms())
+            problem = problem.with_fixed(stage.fixed)
+        self._problems[stage.name] = (stage.version, problem)
+        return problem
+
+    def forget_compiled(self) -> None:
+        """Compiles anew from now on: what was interrupted while it searched or factorised may not be whole."""
+        self._problems = {}
+        self._following = None
+        self.recipe.forget()
+
+    # ---- snapshots -------------------------------------------------------------------------------------
+
+    def snapshot(self) -> Snapshot:
+        """Everything that steering and solving may change; shares nothing with the session that can change."""
+        recipe = self.recipe
+        solvers = {name: copy.copy(problem.solver) for name, (_, problem) in self._problems.items()}
+        return Snapshot(
+            {name: block.clone() for name, block in self.state.items()},
+            recipe.pulls.copy(),
+            recipe.settings,
+            recipe.snapshot(),
+            list(self.runs),
+            dict(self._problems),
+            solvers,
+            copy.copy(self._following),
+            self._moved,
+        )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Puts everything back, bit for bit: what follows is what would have followed then."""
+        self.state = {name: block.clone() for name, block in snapshot.state.items()}
+        self.recipe.take_settings(snapshot.settings)
+        self.recipe.pulls.restore(snapshot.pulls)
+        snapshot.of_recipe()
+        self.runs = list(snapshot.runs)
+        self._problems = dict(snapshot.problems)
+        for name, (_, problem) in self._problems.items():
+            problem.solver = copy.copy(snapshot.solvers[name])
+        self._following, self._moved = copy.copy(snapshot.following), snapshot.moved
+
+    def refined(self) -> Session[R]:
+        """A session on the refinement of the mesh as it is, with handles and held vertices carried along.
+
+        Raises:
+            MeshError: the job works on one mesh.
+        """
+        finer = cast(R, self.recipe.refined(self.state))
+        return Session(finer, callback=self.callback, live=self.recipe.pulls.everywhere)
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Where a session stood."""
+
+    state: State
+    pulls: Any
+    settings: Any
+    of_recipe: Callable[[], None]
+    runs: list[ProjectionResult]
+    problems: dict[str, tuple[object, GuidedProjection]]
+    solvers: dict[str, Any]
+    following: _Following | None
+    moved: bool
+
+
+def _reason(status: Status | None) -> str:
+    if status is None:
+        return "no step is accepted here: damping rises, try again, pull less or loosen the guards"
+    return "at rest" if status.at_rest else status.value

@@ -1,0 +1,63 @@
+"""A whole job: level after level, interruptible anywhere without losing what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from torch import Tensor
+
+from ..._interrupts import deferred_interrupts
+from ...projection import Callback
+from ..stopping import interrupted, interrupted_at_the_start
+from .recipe import Recipe
+from .result import JobResult, Level
+from .session import Session
+
+
+def solved(
+    begin: Callable[[], Recipe[Any]], like: Tensor, *, levels: int = 0, callback: Callback | None = None
+) -> JobResult[Any]:
+    """Does a job, refines the mesh, and does it again on every level.
+
+    Args:
+        begin: Makes the recipe on the coarsest level.
+        like: Tensor of the dtype and on the device of the result.
+        levels: How often to refine.
+        callback: Called with every iteration record; returning True stops. Ctrl-C, or a function that raises
+            KeyboardInterrupt, ends the job: what was found until then is returned, on the finest level on which a step
+            was taken.
+    """
+    done: list[Level] = []
+    notes: list[str] = []
+
+    def begun() -> tuple[Session[Any], dict[str, float]]:
+        session = Session(begin(), callback=callback)
+        return session, session.recipe.before()
+
+    def finer(session: Session[Any]) -> tuple[Session[Any], dict[str, float], bool] | None:
+        """The session on the next level, solved; None if it was interrupted before a step was taken."""
+        result = session.refined()
+        before = result.recipe.before()
+        ended = result.solve()
+        return None if interrupted_at_the_start(result.runs) else (result, before, ended)
+
+    with deferred_interrupts() as interrupts:
+        session, before = interrupts.insist(begun)
+        stopped = interrupts.insist(session.solve)
+        for number in range(levels + 1):
+            if number:
+                found = interrupts.attempt(finer, session)
+                if found is None:
+                    stopped, runs = True, done[-1].runs
+                    runs[-1] = interrupted(runs[-1])
+                    break
+                session, before, stopped = found
+            recipe = session.recipe
+            level = interrupts.insist(recipe.level, session.state, before, list(session.runs), like)
+            done.append(level)
+            said = [*recipe.notes, *(str(promise) for promise in level.promises if not promise.holds)]
+            notes += [f"level {number}: {note}" if levels else note for note in said]
+            if stopped:
+                break
+    return JobResult(done, notes, stopped)
