@@ -33,6 +33,7 @@ _LARGEST_WARP = 1e-2  # relative planarity above which planarity is imposed in s
 _PLANARITY_STAGES = 8
 _PLANAR_ENOUGH = 5e-5
 _MOST_STAGES = 20
+_NO_LIMIT = 1e9  # mean edge lengths
 
 
 class FairProblem:
@@ -205,13 +206,14 @@ class FairProblem:
             return []
         close = used if self.boundary is None else used & ~(self.boundary.held & ~self.pulls.pulled)
         chosen = torch.nonzero(used if self.pulls.everywhere else close).squeeze(1)
-        (term,) = c.closeness_terms(self._planes, chosen, weight=settings.closeness_weight)
-        terms = [replace(term, element_weights=close[chosen].to(self.vertices)) if self.pulls.everywhere else term]
-        if self.limits is not None:
-            terms += c.distance_limit_terms(self._nearest, self.limits, weight=settings.quality_weight)
-        if not self.design_mode:
-            return terms
-        return [replace(term, element_weights=self.vertices.new_zeros(term.num_elements)) for term in terms]
+        (term,) = c.closeness_terms(self._surface, chosen, weight=settings.closeness_weight)
+        if self.pulls.everywhere:
+            weights = torch.zeros_like(close) if self.design_mode else close
+            term = replace(term, element_weights=weights[chosen].to(self.vertices))
+        if self.limits is None:
+            return [term]
+        limits = torch.full_like(self.limits, _NO_LIMIT) if self.design_mode else self.limits
+        return [term, *c.distance_limit_terms(self._surface_or_curve, limits, weight=settings.quality_weight)]
 
     def _limits(self) -> Tensor | None:
         """(V,) largest distances from the reference that are allowed."""
@@ -223,6 +225,13 @@ class FairProblem:
         if far:
             self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")
         return distances.clamp_min(limit) * (1.0 + 1e-9)  # rounding at the start
+
+    def _surface(self, state: State) -> tuple[Tensor, Tensor]:
+        """Closest points on the surface and normals there; where it is given up, nothing that costs."""
+        return (state["vertices"], self.vertices) if self.design_mode else self._planes(state)
+
+    def _surface_or_curve(self, state: State) -> tuple[Tensor, Tensor]:
+        return (state["vertices"], self.vertices) if self.design_mode else self._nearest(state)
 
     def _nearest(self, state: State) -> tuple[Tensor, Tensor]:
         """Planes from which distances are measured: of gliding vertices from the surface or from their curve."""

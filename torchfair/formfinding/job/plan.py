@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from torch import Tensor
 
@@ -45,6 +45,23 @@ class Stage:
     guard: Guard | None = None
     result: Callable[[State], State] = _same
     anew: bool = False
+
+
+_REST = 1e-2  # relative fall of the merit in one step
+_LARGEST_DAMPING = 0.1  # where live steps were refused
+
+
+def at_rest(stage: Stage, damping: float | None) -> Stage:
+    """The stage, ended as soon as a step changes the merit by little, which the eye takes for rest.
+
+    Args:
+        stage: What live steps do.
+        damping: Where it goes on.
+    """
+    settings = replace(stage.settings, merit_tolerance=_REST, patience=1, when_settled="stop")
+    if damping is not None:
+        settings = replace(settings, initial_damping=min(damping, _LARGEST_DAMPING))
+    return replace(stage, settings=settings)
 
 
 Stages = Generator[Stage, ProjectionResult, None]

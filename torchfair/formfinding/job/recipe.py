@@ -16,7 +16,7 @@ from ...projection.layout import State
 from ...topology import Topology
 from ..checks import one_start, refuse_degenerate_faces
 from ..handles import read_handles
-from .plan import OneStage, Plan, Stage
+from .plan import OneStage, Plan, Stage, at_rest
 from .promises import Promise
 from .pulls import Pulls
 from .result import Level
@@ -80,9 +80,14 @@ class Recipe(ABC, Generic[S]):
     def follower(self, state: State) -> Stage:
         """What one step of a live session lowers, from a state on."""
 
-    def settling(self, state: State) -> Plan:
-        """What a live session does once handles are let go, by default what its steps do, to the end."""
-        return OneStage(self.follower(state))
+    def settling(self, state: State, damping: float | None) -> Plan:
+        """What a live session does once handles are let go: by default what its steps do, until one changes little.
+
+        Args:
+            state: Where the mesh is.
+            damping: Of the last live step; None if there was none.
+        """
+        return OneStage(at_rest(self.follower(state), damping))
 
     def state(self) -> State:
         """Variable blocks at the start."""

@@ -74,7 +74,7 @@ class Session(Generic[R]):
     Args:
         recipe: The job.
         callback: Called with every iteration record; returning True stops a solve.
-        live: Whether handles may be added later without new index maps.
+        live: Whether any vertex may become a handle later without new index maps.
 
     Attributes:
         state: The blocks found so far, normalised.
@@ -82,14 +82,14 @@ class Session(Generic[R]):
 
     Example::
 
-        session = Session(FairRecipe(vertices, topology), live=True)
+        session = Session(FairRecipe(vertices, topology))
         session.move({17: (0.1, 0.0, 0.4)})
         while session.step().accepted:
             show(session.vertices)
         session.settle()
     """
 
-    def __init__(self, recipe: R, *, callback: Callback | None = None, live: bool = False) -> None:
+    def __init__(self, recipe: R, *, callback: Callback | None = None, live: bool = True) -> None:
         self.recipe, self.callback = recipe, callback
         recipe.pulls.everywhere = live
         self.state: State = recipe.state()
@@ -195,8 +195,13 @@ class Session(Generic[R]):
         return self._following
 
     def settle(self) -> bool:
-        """Brings the mesh to rest; whether someone stopped it."""
-        return self._edited(self.recipe.settling)
+        """Brings the mesh to rest, with the damping of the last live step; whether someone stopped it."""
+        damping = None if self._following is None else self._following.state.damping
+
+        def plan(state: State) -> Plan:
+            return self.recipe.settling(state, damping)
+
+        return self._edited(plan)
 
     # ---- whole -----------------------------------------------------------------------------------------
 

@@ -32,7 +32,7 @@ def solved(
     notes: list[str] = []
 
     def begun() -> tuple[Session[Any], dict[str, float]]:
-        session = Session(begin(), callback=callback)
+        session = Session(begin(), callback=callback, live=False)
         return session, session.recipe.before()
 
     def finer(session: Session[Any]) -> tuple[Session[Any], dict[str, float], bool] | None:
