@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from torch import Tensor
 
@@ -60,8 +62,9 @@ class FairRecipe(Recipe[FairSettings]):
         return FairPlan(self.problem, state)
 
     def follower(self, state: State) -> Stage:
-        """Everything at once, with the sharp absolute value."""
-        return self.problem.stage(state, 1.0, 1.0, self.settings.projection)
+        """Everything at once, with the sharp absolute value; longer steps would carry handles past their targets."""
+        settings = replace(self.settings.projection, least_extrapolation=math.inf)
+        return self.problem.stage(state, 1.0, 1.0, settings)
 
     def state(self) -> State:
         """The start, with auxiliary variables that fit it."""

@@ -1,0 +1,257 @@
+"""Live sessions: handles that move, vertices that are held, weights that are turned, snapshots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+import torch
+from helpers import DOUBLE, grid_faces, split_quads
+from torch import Tensor
+
+from torchfair import MeshError, ShapeError, Topology
+from torchfair.errors import SettingsError
+from torchfair.formfinding import FairRecipe, FairSettings, Session, minimise_normal_variation
+from torchfair.projection import IterationRecord
+
+MIDDLE = 24  # of the sheet
+
+
+def sheet(n: int = 7) -> tuple[Tensor, Topology]:
+    """A saddle over a bent grid with edges of about one."""
+    x, y = torch.meshgrid(*(torch.arange(n, dtype=DOUBLE) - n // 2,) * 2, indexing="ij")
+    x, y = x + 0.1 * torch.sin(2.0 * y), y + 0.1 * torch.sin(3.0 * x)
+    vertices = torch.stack([x, y, 0.08 * (x**2 - y**2)], dim=-1).reshape(-1, 3)
+    return vertices, Topology.from_faces(split_quads(grid_faces(n, n)))
+
+
+def opened(**settings: object) -> Session[FairRecipe]:
+    return Session(FairRecipe(*sheet(), settings=FairSettings(**settings)))  # type: ignore[arg-type]
+
+
+def above(session: Session[FairRecipe], height: float, vertex: int = MIDDLE) -> list[float]:
+    """A place over where a vertex started, in mean edge lengths."""
+    up = torch.tensor([0.0, 0.0, height * session.recipe.unit.length], dtype=DOUBLE)
+    place: list[float] = (session.recipe.given[vertex] + up).tolist()
+    return place
+
+
+def drag(session: Session[FairRecipe], moves: int = 4, start: float = 0.0) -> list[float]:
+    """Lags of the handle behind its target after each move, in mean edges."""
+    lags = []
+    for number in range(1, moves + 1):
+        place = above(session, start + 0.1 * number)
+        session.move({MIDDLE: place})
+        assert session.step().accepted
+        lags.append(float((session.vertices[MIDDLE] - torch.tensor(place)).norm()) / session.recipe.unit.length)
+    return lags
+
+
+def test_a_handle_that_is_dragged_is_followed_step_by_step() -> None:
+    session = opened()
+    assert max(drag(session, 8)) < 0.01
+    others = (session.vertices - session.recipe.given).norm(dim=1)
+    near = session.recipe.topology.edges
+    ring = near[(near == MIDDLE).any(1)].flatten().unique()
+    assert float(others[ring].min()) > 0.02  # its surroundings come along
+
+
+def test_steps_at_rest_are_none_and_say_so() -> None:
+    session = opened()
+    for _ in range(200):
+        progress = session.step()
+        if not progress.accepted:
+            break
+    assert not progress.accepted
+    assert progress.reason == "at rest"
+    before = session.vertices
+    assert not session.step().accepted
+    assert torch.equal(session.vertices, before)
+
+
+def test_the_merit_never_rises_between_moves() -> None:
+    session, merits = opened(), []
+    session.move({MIDDLE: above(session, 0.4)})
+    for _ in range(6):
+        progress = session.step()
+        assert progress.record is not None
+        merits.append(progress.record.merit)
+    assert merits == sorted(merits, reverse=True)
+
+
+def test_settling_and_solving_end_below_where_following_left_off() -> None:
+    session = opened()
+    drag(session)
+    followed = session.measures()
+    assert not session.settle()
+    settled = session.measures()
+    session.solve()
+    assert session.runs[-1].merit <= session.runs[0].merit * 1.01
+    assert settled["normal_variation"] <= followed["normal_variation"] * (1.0 + 1e-3)
+    assert settled["largest_handle_distance"] < 0.01
+
+
+def test_far_moves_are_followed_in_portions() -> None:
+    session = opened()
+    session.move({MIDDLE: above(session, 2.0)})
+    gaps = []
+    for _ in range(8):
+        assert session.step().accepted
+        gaps.append(session.measures()["largest_handle_distance"] / session.recipe.unit.length)
+    assert gaps[0] > 1.4  # half a mean edge at a time
+    assert gaps[-1] < 0.02
+    assert session.measures()["flipped_faces"] == 0
+
+
+def test_held_vertices_stay_exactly_and_come_along_when_they_are_freed() -> None:
+    session = opened()
+    held = [MIDDLE - 1, MIDDLE + 1]
+    session.hold(held)
+    drag(session)
+    assert torch.equal(session.vertices[held], session.recipe.given[held])
+    session.free(held)
+    drag(session, start=0.4)
+    assert float((session.vertices[held] - session.recipe.given[held]).norm(dim=1).min()) > 0.01
+
+
+def test_a_vertex_that_is_held_after_it_moved_stays_there() -> None:
+    session = opened()
+    drag(session)
+    place = session.vertices[MIDDLE].clone()
+    session.hold([MIDDLE])
+    session.move({10: above(session, 0.2, 10)})
+    session.step()
+    torch.testing.assert_close(session.vertices[MIDDLE], place, rtol=0.0, atol=1e-14)
+
+
+def test_handles_that_are_let_go_no_longer_pull() -> None:
+    session = opened(distance_limit=None)
+    drag(session)
+    session.free([MIDDLE])
+    session.step()
+    session.settle()
+    assert float((session.vertices[MIDDLE] - torch.tensor(above(session, 0.4))).norm()) > 0.2
+
+
+def test_index_maps_and_analysis_are_kept_whatever_is_steered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Handles, held vertices and weights are data: nothing is compiled after the first step."""
+    from torchfair.formfinding.job import session as module
+
+    session = opened()
+    session.step()
+    made: list[int] = []
+    original: Callable[..., object] = module.GuidedProjection
+    monkeypatch.setattr(module, "GuidedProjection", lambda *a, **k: made.append(1) or original(*a, **k))
+    before = next(iter(session._problems.values()))[1]
+    drag(session)
+    session.hold([3])
+    session.step()
+    session.free([3])
+    session.weigh(fairness=0.7, closeness=3.0)
+    session.move({5: above(session, 0.1, 5)})
+    session.step()
+    session.settle()
+    after = next(iter(session._problems.values()))[1]
+    assert not made
+    assert after.structure.lower is before.structure.lower
+
+
+def test_weights_act_on_the_running_solve() -> None:
+    """More fairness, evener edges."""
+    spreads = []
+    for weight in (0.01, 30.0):
+        session = opened(distance_limit=None)
+        session.step()
+        session.weigh(fairness=weight, closeness=0.1)
+        for _ in range(10):
+            session.step()
+        ends = session.vertices[session.recipe.topology.edges]
+        spreads.append(float((ends[:, 0] - ends[:, 1]).norm(dim=1).std()))
+    assert spreads[1] < spreads[0]
+
+
+@pytest.mark.parametrize("at", ["start", "dragged", "settled"])
+def test_snapshots_bring_everything_back_bit_for_bit(at: str) -> None:
+    session = opened()
+    if at != "start":
+        drag(session)
+    if at == "settled":
+        session.settle()
+    snapshot = session.snapshot()
+
+    def goes_on() -> list[Tensor]:
+        places = []
+        drag(session, 3, start=0.4)
+        places.append(session.vertices)
+        session.hold([8])
+        session.weigh(fairness=1.0)
+        session.step()
+        session.settle()
+        places.append(session.vertices)
+        return places
+
+    once = goes_on()
+    runs = len(session.runs)
+    session.restore(snapshot)
+    assert session.recipe.settings.fairness_weight == FairSettings().fairness_weight
+    twice = goes_on()
+    assert len(session.runs) == runs
+    for first, second in zip(once, twice, strict=True):
+        assert torch.equal(first, second)
+
+
+def test_a_callback_that_raises_leaves_a_session_as_it_was() -> None:
+    session = opened()
+    drag(session)
+    before, runs = session.vertices.clone(), len(session.runs)
+    undisturbed = session.snapshot()
+    session.solve()
+    expected = session.vertices.clone()
+    session.restore(undisturbed)
+
+    def fail(record: IterationRecord) -> None:
+        if record.iteration == 3:
+            raise ZeroDivisionError
+
+    session.callback = fail
+    with pytest.raises(ZeroDivisionError):
+        session.solve()
+    assert torch.equal(session.vertices, before)
+    assert len(session.runs) == runs
+    session.callback = None
+    session.solve()
+    assert torch.equal(session.vertices, expected)
+
+
+def test_a_whole_solve_from_a_session_is_the_job() -> None:
+    vertices, topology = sheet()
+    session = Session(FairRecipe(vertices, topology))
+    session.solve()
+    result = minimise_normal_variation(vertices, topology)
+    torch.testing.assert_close(session.vertices, result.vertices, rtol=0.0, atol=1e-9)
+
+
+def test_the_time_limit_is_that_of_a_whole_solve() -> None:
+    from dataclasses import replace
+
+    settings = FairSettings()
+    limited = replace(settings, projection=replace(settings.projection, time_limit=0.0))
+    result = minimise_normal_variation(*sheet(), settings=limited)
+    assert result.stopped
+    assert len(result.runs) == 1
+
+
+def test_wrong_steering_is_refused_by_name() -> None:
+    session = opened()
+    with pytest.raises(MeshError, match="vertices are numbered 0 to 48, got \\[49\\]"):
+        session.hold([3, 49])
+    with pytest.raises(MeshError, match="handle 50 is no vertex"):
+        session.move({50: (0.0, 0.0, 0.0)})
+    with pytest.raises(ShapeError, match="three finite coordinates"):
+        session.move({5: (0.0, float("nan"), 0.0)})
+    with pytest.raises(SettingsError, match=r"weights of this job are .*fairness.*, got glue"):
+        session.weigh(glue=1.0)
+    with pytest.raises(SettingsError, match="at least 0"):
+        session.weigh(fairness=-1.0)
+    with pytest.raises(MeshError, match="does not refine"):
+        session.refined()
