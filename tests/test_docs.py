@@ -27,7 +27,7 @@ COMMANDS = [
 
 @pytest.mark.parametrize("code", EXAMPLES)
 def test_python_example_runs(code: str) -> None:
-    exec(compile(code, "example", "exec"), {"__name__": "example"})
+    exec(compile(code, "example", "exec", dont_inherit=True), {"__name__": "example"})
 
 
 @pytest.mark.parametrize("line", COMMANDS)

@@ -10,10 +10,14 @@ from .form.settings import FormSettings as FormSettings
 from .form.start_surface import start_surface as start_surface
 from .job import JobResult as JobResult
 from .job import Level as Level
+from .job import OneStage as OneStage
+from .job import Plan as Plan
 from .job import Progress as Progress
 from .job import Promise as Promise
 from .job import Recipe as Recipe
 from .job import Session as Session
+from .job import Stage as Stage
+from .job import solved as solved
 from .symmetric.design import SymmetricDesign as SymmetricDesign
 from .symmetric.measures import condition_residuals as condition_residuals
 from .symmetric.measures import symmetric_measures as symmetric_measures

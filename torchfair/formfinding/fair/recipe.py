@@ -52,9 +52,8 @@ class FairRecipe(Recipe[FairSettings]):
         super().take_settings(settings)
         self.problem.settings = settings
 
-    def pull(self, places: Mapping[int, Sequence[float]]) -> None:
-        """See the base class; where a handle leaves the reference surface, that is given up."""
-        super().pull(places)
+    def reconsider(self) -> None:
+        """Where a handle leaves the reference surface, that is given up."""
         self.problem.reconsider()
 
     def plan(self, state: State) -> FairPlan:

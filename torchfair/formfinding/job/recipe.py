@@ -127,6 +127,10 @@ class Recipe(ABC, Generic[S]):
         vertices, targets = read_handles(places, self.topology)
         self.check_pulls(vertices, targets)
         self.pulls.pull(vertices, self.unit.apply(targets))
+        self.reconsider()
+
+    def reconsider(self) -> None:
+        """Called after handles or held vertices have changed, for decisions that depend on them."""
 
     def check_pulls(self, vertices: Tensor, targets: Tensor) -> None:
         """Refuses handles (n,) with targets (n, 3), in the unit of the input, that cannot be reached."""

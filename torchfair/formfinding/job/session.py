@@ -124,11 +124,13 @@ class Session(Generic[R]):
     def hold(self, vertices: Iterable[int]) -> None:
         """Keeps vertices where they are, from now on."""
         self.recipe.pulls.hold(self._numbers(vertices))
+        self.recipe.reconsider()
         self._moved = True
 
     def free(self, vertices: Iterable[int]) -> None:
         """Lets vertices go that were pulled or held."""
         self.recipe.pulls.free(self._numbers(vertices))
+        self.recipe.reconsider()
         self._moved = True
 
     def weigh(self, **weights: float) -> None:
@@ -314,6 +316,8 @@ class Session(Generic[R]):
         self.state = {name: block.clone() for name, block in snapshot.state.items()}
         self.recipe.take_settings(snapshot.settings)
         self.recipe.pulls.restore(snapshot.pulls)
+        self.recipe.reconsider()
+        self.recipe.pulls.version = snapshot.pulls.version
         snapshot.of_recipe()
         self.runs = list(snapshot.runs)
         self._problems = dict(snapshot.problems)
