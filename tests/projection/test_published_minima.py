@@ -63,6 +63,7 @@ def test_minimum_is_reached_from_the_published_start(name: str) -> None:
     assert is_minimum(problem, 2 * result.merit), result.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "factor"), _FAR)
 def test_converged_is_said_only_at_a_minimum(name: str, factor: int) -> None:
     """From ten and a hundred times the start; where no minimum is reached, the status says so."""
