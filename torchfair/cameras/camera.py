@@ -18,6 +18,7 @@ Size: TypeAlias = int | tuple[int, int]
 """Pixels of a picture: one number for a square, or (height, width)."""
 
 _NEAR = 1e-4  # part of the distance of what an eye looks at
+_FINAL = {"local", "to_screen", "project", "directions_at", "view_directions", "rays", "weights_in_space"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,8 @@ class Camera(ABC):
     The lines of sight of a view are parallel, as in :class:`OrthographicCamera`, or meet in an eye, as in
     :class:`PerspectiveCamera`. Another kind is a frozen dataclass whose fields are tensors ``(views, ...)`` and which
     gives :attr:`axes`, :attr:`origins`, :attr:`distances` and :meth:`scales`; everything else follows from these four.
-    What bends lines, such as a fisheye, is no camera here, because the edges of its pictures are no longer straight.
+    What bends lines, such as a fisheye, is no camera here, because the edges of its pictures are no longer straight:
+    a subclass that overrides a final method is refused.
 
     Pixel ``(row j, column i)`` is the square ``[i, i+1] x [j, j+1]``: x runs to the right, y downwards, row 0 is at
     the top. The line of sight along the third local coordinate meets the middle of the picture.
@@ -56,6 +58,15 @@ class Camera(ABC):
                 return torch.full((self.slopes.shape[0],), width / 2, dtype=torch.float64)
     """
 
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        changed = sorted(_FINAL & vars(cls).keys())
+        if changed:
+            raise TypeError(
+                f"{cls.__name__} overrides {', '.join(changed)}: a camera keeps straight lines straight. Give axes, "
+                "origins, distances and scales only, or draw your own pictures from your own rays"
+            )
+
     @property
     @abstractmethod
     def axes(self) -> Tensor:
@@ -72,7 +83,7 @@ class Camera(ABC):
     @property
     @abstractmethod
     def distances(self) -> Tensor | None:
-        """``(views,)`` from the eyes to what they look at, above 0; None where lines of sight are parallel."""
+        """``(views,)`` from the eyes to what they look at, along the middle; None where lines of sight are parallel."""
 
     @abstractmethod
     def scales(self, width: int) -> Tensor:
