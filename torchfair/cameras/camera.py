@@ -192,7 +192,7 @@ class Camera(ABC):
 
     @property
     def _local_to_world(self) -> Tensor:
-        """(views, 3, 3): a step along each local coordinate alone, as rows; :attr:`axes` if they are perpendicular."""
+        """(views, 3, 3): a step along each local coordinate alone, as rows."""
         inverse: Tensor = torch.linalg.inv(self.axes)
         return inverse.mT
 

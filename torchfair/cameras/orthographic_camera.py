@@ -98,3 +98,7 @@ class OrthographicCamera(Camera):
     def scales(self, width: int) -> Tensor:
         """``(views,)`` pixels per unit of length in a picture ``width`` pixels wide."""
         return width / (2 * self.half_widths)
+
+    @property
+    def _local_to_world(self) -> Tensor:
+        return self.axes  # which are perpendicular, so nothing is lost in an inverse

@@ -94,3 +94,7 @@ class PerspectiveCamera(Camera):
     def scales(self, width: int) -> Tensor:
         """``(views,)`` pixels per unit of length at distance 1, in a picture ``width`` pixels wide."""
         return width / (2 * torch.tan(torch.deg2rad(self.fields_of_view) / 2))
+
+    @property
+    def _local_to_world(self) -> Tensor:
+        return self.axes  # which are perpendicular, so nothing is lost in an inverse
