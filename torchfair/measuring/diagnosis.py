@@ -1,4 +1,4 @@
-"""Everything that ``torchfair diagnose`` says about the stars of a mesh."""
+"""Which vertex stars of a mesh are bad, and what that does to its Gauss image."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ..errors import MeshError
+from .._threads import threads_for
+from ..errors import MeshError, ShapeError, TorchfairError
 from ..stars import (
     GaussOverlaps,
     StarClasses,
@@ -21,6 +22,7 @@ from ..stars import (
     pyramid_windings,
 )
 from ..topology import Topology
+from ._one_mesh import one_mesh
 
 MOST_ARCS = 200_000
 """Interior edges up to which crossings in the whole Gauss image are counted."""
@@ -57,11 +59,121 @@ class Diagnosis:
         isolated = (self.topology.valences == 0).to(torch.int64)
         return [names[code] for code in (self.classes.kinds.to(torch.int64) + isolated).tolist()]
 
+    def counts(self) -> dict[str, Any]:
+        """How many stars of each kind, how many folded pyramids and crossings; angles in degrees.
+
+        Keys are those of ``torchfair diagnose --json``; a value is None where there is nothing to measure.
+        """
+        classes, topology, inner = self.classes, self.topology, self.inner
+        convex, saddle, neither = map(classes.is_kind, (StarKind.CONVEX, StarKind.SADDLE, StarKind.NEITHER))
+        folded = self.crossings > 0
+        perimeters = self.perimeters[inner].rad2deg()
+        overlaps = self.overlaps
+        windings, frequencies = torch.unique(self.windings[inner], return_counts=True)
+        return {
+            "vertices": topology.num_vertices,
+            "faces": topology.num_faces,
+            "inner_vertices": _count(inner),
+            "boundary_vertices": _count(topology.is_boundary_vertex),
+            "isolated_vertices": _count(topology.valences == 0),
+            "convex": _count(convex),
+            "flat": _count(classes.flat),
+            "saddle": _count(saddle),
+            "good_saddle": _count(classes.good),
+            "bad_saddle": _count(saddle & ~classes.good),
+            "neither": _count(neither),
+            "degenerate_stars": _count(classes.degenerate),
+            "self_intersecting_pyramids": _count(folded),
+            "self_intersecting_pyramids_by_class": {
+                "convex": _count(folded & convex),
+                "good_saddle": _count(folded & classes.good),
+                "bad_saddle": _count(folded & saddle & ~classes.good),
+                "neither": _count(folded & neither),
+            },
+            "pyramid_self_intersections": int(self.crossings.sum()),
+            "mean_pyramid_perimeter_degrees": float(perimeters.mean()) if perimeters.numel() else None,
+            "largest_pyramid_perimeter_degrees": float(perimeters.max()) if perimeters.numel() else None,
+            "positive_angle_defects": _count(classes.defect_signs > 0),
+            "negative_angle_defects": _count(classes.defect_signs < 0),
+            "neither_with_negative_angle_defect": _count(neither & (classes.defect_signs < 0)),
+            "saddle_patterns": _named(classes.pattern_counts(kind=StarKind.SADDLE)),
+            "ordinary_patterns": _named(classes.pattern_counts(ordinary=True)),
+            "pyramid_windings": {str(w): n for w, n in zip(windings.tolist(), frequencies.tolist(), strict=True)},
+            "gauss_image_crossings": None if overlaps is None else overlaps.crossings,
+            "gauss_image_crossings_between_stars": None if overlaps is None else overlaps.between_stars,
+        }
+
+    def worst_vertices(self, count: int) -> list[dict[str, Any]]:
+        """The ``count`` worst vertices that are no convex or good saddle stars, or have a self-intersecting pyramid.
+
+        Those with most self-intersections come first, then those that are neither convex nor saddles, then those with
+        the longest perimeters, then smaller numbers.
+
+        Raises:
+            ShapeError: if ``count`` is negative.
+        """
+        if count < 0:
+            raise ShapeError("count", "0 or more", count)
+        classes, crossings = self.classes, self.crossings
+        neither = classes.is_kind(StarKind.NEITHER)
+        bad = classes.is_kind(StarKind.SADDLE) & ~classes.good
+        suspect = torch.nonzero((crossings > 0) | neither | bad).squeeze(1)
+        # Sorted by the least important key first; a perimeter rounded to 1e-9 keeps ties in the order of the numbers.
+        for key in ((self.perimeters * 1e9).round(), neither.to(torch.int64), crossings):
+            suspect = suspect[key[suspect].argsort(descending=True, stable=True)]
+        return [self.describe_vertex(vertex) for vertex in suspect[:count].tolist()]
+
+    def describe_vertex(self, vertex: int) -> dict[str, Any]:
+        """One inner vertex in words and numbers.
+
+        Raises:
+            TorchfairError: if there is no such vertex, or it is not inside.
+        """
+        if not (0 <= vertex < self.topology.num_vertices and bool(self.inner[vertex])):
+            raise TorchfairError(f"vertex {vertex} is not inside the mesh: it has no star to describe")
+        classes = self.classes
+        good = bool(classes.good[vertex])
+        name = StarKind(int(classes.kinds[vertex])).name.lower()
+        return {
+            "vertex": vertex,
+            "valence": int(self.topology.valences[vertex]),
+            "class": f"{'good' if good else 'bad'} saddle" if name == "saddle" else name,
+            "pattern": list(classes.pattern(vertex)),
+            "ordinary_pattern": list(classes.pattern(vertex, ordinary=True)),
+            "inflection_faces": int(classes.inflection_counts[vertex]),
+            "self_intersections": int(self.crossings[vertex]),
+            "perimeter_degrees": math.degrees(float(self.perimeters[vertex])),
+            "angle_defect_sign": int(classes.defect_signs[vertex]),
+        }
+
+    def per_vertex(self) -> dict[str, list[Any]]:
+        """Lists with one entry for each vertex."""
+        return {
+            "class": self.class_names(),
+            "good_saddle": self.classes.good.tolist(),
+            "self_intersections": self.crossings.tolist(),
+            "perimeter_degrees": self.perimeters.rad2deg().tolist(),
+            "winding": self.windings.tolist(),
+            "angle_defect_sign": self.classes.defect_signs.tolist(),
+        }
+
 
 def diagnose_mesh(vertices: Tensor, topology: Topology) -> Diagnosis:
-    """Judges all stars of one mesh ``(V, 3)``."""
-    from .._threads import threads_for
+    """Judges all stars of one mesh.
 
+    Example::
+
+        diagnosis = diagnose_mesh(vertices, topology)
+        diagnosis.counts()["bad_saddle"], diagnosis.worst_vertices(3)
+
+    Args:
+        vertices: positions ``(V, 3)``, any length unit.
+        topology: connectivity; any polygons, mixed.
+
+    Raises:
+        ShapeError: if ``vertices`` are not one mesh that fits the topology.
+    """
+    vertices = one_mesh(vertices, topology)
     # Stars are judged in small chunks: waking a second thread for each operation costs more than it saves.
     with threads_for(0, vertices.device):
         return Diagnosis(
@@ -82,93 +194,6 @@ def _overlaps(vertices: Tensor, topology: Topology) -> GaussOverlaps | None:
         return gauss_overlaps(vertices, topology)
     except MeshError:
         return None
-
-
-def counts(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The numbers, by the keys of the JSON output."""
-    classes, topology, inner = diagnosis.classes, diagnosis.topology, diagnosis.inner
-    convex, saddle, neither = (classes.is_kind(kind) for kind in (StarKind.CONVEX, StarKind.SADDLE, StarKind.NEITHER))
-    folded = diagnosis.crossings > 0
-    perimeters = diagnosis.perimeters[inner].rad2deg()
-    overlaps = diagnosis.overlaps
-    windings, frequencies = torch.unique(diagnosis.windings[inner], return_counts=True)
-    return {
-        "vertices": topology.num_vertices,
-        "faces": topology.num_faces,
-        "inner_vertices": _count(inner),
-        "boundary_vertices": _count(topology.is_boundary_vertex),
-        "isolated_vertices": _count(topology.valences == 0),
-        "convex": _count(convex),
-        "flat": _count(classes.flat),
-        "saddle": _count(saddle),
-        "good_saddle": _count(classes.good),
-        "bad_saddle": _count(saddle & ~classes.good),
-        "neither": _count(neither),
-        "degenerate_stars": _count(classes.degenerate),
-        "self_intersecting_pyramids": _count(folded),
-        "self_intersecting_pyramids_by_class": {
-            "convex": _count(folded & convex),
-            "good_saddle": _count(folded & classes.good),
-            "bad_saddle": _count(folded & saddle & ~classes.good),
-            "neither": _count(folded & neither),
-        },
-        "pyramid_self_intersections": int(diagnosis.crossings.sum()),
-        "mean_pyramid_perimeter_degrees": float(perimeters.mean()) if perimeters.numel() else None,
-        "largest_pyramid_perimeter_degrees": float(perimeters.max()) if perimeters.numel() else None,
-        "positive_angle_defects": _count(classes.defect_signs > 0),
-        "negative_angle_defects": _count(classes.defect_signs < 0),
-        "neither_with_negative_angle_defect": _count(neither & (classes.defect_signs < 0)),
-        "saddle_patterns": _named(classes.pattern_counts(kind=StarKind.SADDLE)),
-        "ordinary_patterns": _named(classes.pattern_counts(ordinary=True)),
-        "pyramid_windings": {str(w): n for w, n in zip(windings.tolist(), frequencies.tolist(), strict=True)},
-        "gauss_image_crossings": None if overlaps is None else overlaps.crossings,
-        "gauss_image_crossings_between_stars": None if overlaps is None else overlaps.between_stars,
-    }
-
-
-def worst_vertices(diagnosis: Diagnosis, count: int) -> list[dict[str, Any]]:
-    """The ``count`` worst vertices that are no convex or good saddle stars, or have a self-intersecting pyramid.
-
-    Those with most self-intersections come first, then those that are neither convex nor saddles, then those with
-    the longest perimeters, then smaller numbers.
-    """
-    classes, crossings = diagnosis.classes, diagnosis.crossings
-    neither = classes.is_kind(StarKind.NEITHER)
-    suspect = torch.nonzero((crossings > 0) | neither | (classes.is_kind(StarKind.SADDLE) & ~classes.good)).squeeze(1)
-    # Sorted by the least important key first; a perimeter rounded to 1e-9 keeps ties in the order of the numbers.
-    for key in ((diagnosis.perimeters * 1e9).round(), neither.to(torch.int64), crossings):
-        suspect = suspect[key[suspect].argsort(descending=True, stable=True)]
-    return [describe_vertex(diagnosis, vertex) for vertex in suspect[:count].tolist()]
-
-
-def describe_vertex(diagnosis: Diagnosis, vertex: int) -> dict[str, Any]:
-    """One inner vertex in words and numbers."""
-    classes = diagnosis.classes
-    good = bool(classes.good[vertex])
-    name = StarKind(int(classes.kinds[vertex])).name.lower()
-    return {
-        "vertex": vertex,
-        "valence": int(diagnosis.topology.valences[vertex]),
-        "class": f"{'good' if good else 'bad'} saddle" if name == "saddle" else name,
-        "pattern": list(classes.pattern(vertex)),
-        "ordinary_pattern": list(classes.pattern(vertex, ordinary=True)),
-        "inflection_faces": int(classes.inflection_counts[vertex]),
-        "self_intersections": int(diagnosis.crossings[vertex]),
-        "perimeter_degrees": math.degrees(float(diagnosis.perimeters[vertex])),
-        "angle_defect_sign": int(classes.defect_signs[vertex]),
-    }
-
-
-def per_vertex(diagnosis: Diagnosis) -> dict[str, list[Any]]:
-    """Lists with one entry for each vertex."""
-    return {
-        "class": diagnosis.class_names(),
-        "good_saddle": diagnosis.classes.good.tolist(),
-        "self_intersections": diagnosis.crossings.tolist(),
-        "perimeter_degrees": diagnosis.perimeters.rad2deg().tolist(),
-        "winding": diagnosis.windings.tolist(),
-        "angle_defect_sign": diagnosis.classes.defect_signs.tolist(),
-    }
 
 
 def _count(mask: Tensor) -> int:

@@ -1,4 +1,4 @@
-"""Everything that ``torchfair measure`` says about a mesh."""
+"""Energies, curvature, area, lengths and angles of one mesh, each with its unit."""
 
 from __future__ import annotations
 
@@ -6,29 +6,27 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Literal
 
 import torch
 from torch import Tensor
 
 from .. import energies, geometry
-from ..geometry.planarity import planarity
+from ..errors import ShapeError
 from ..topology import Topology
+from ._one_mesh import one_mesh
 
-LENGTH = "length units of the file"
-AREA = "square length units of the file"
-PER_LENGTH = "1 / length unit of the file"
-DEGREES = "degrees"
-NUMBER = "dimensionless"
+Unit = Literal["length", "area", "1 / length", "degrees", "dimensionless"]
 
-_ENERGIES = {
-    "normal_variation": ("E   normal variation       sum l l*", LENGTH),
-    "angle_variation": ("E'  angle variation        sum l |a|", LENGTH),
-    "total_mean_curvature": ("    total mean curvature   1/2 sum l a", LENGTH),
-    "total_absolute_curvature": ("C   absolute curvature     sum |k1| + |k2|", LENGTH),
-    "total_absolute_curvature_corrected": ("C   the same, corrected    by vertex normals", LENGTH),
-    "total_frobenius_curvature": ("C2  Frobenius curvature    sum sqrt(k1^2 + k2^2)", LENGTH),
-    "umbrella_fairness": ("    umbrella fairness", AREA),
-    "polyline_fairness": ("    polyline fairness", AREA),
+_ENERGIES: dict[str, Unit] = {
+    "normal_variation": "length",
+    "angle_variation": "length",
+    "total_mean_curvature": "length",
+    "total_absolute_curvature": "length",
+    "total_absolute_curvature_corrected": "length",
+    "total_frobenius_curvature": "length",
+    "umbrella_fairness": "area",
+    "polyline_fairness": "area",
 }
 
 
@@ -37,17 +35,16 @@ class Quantity:
     """One measured number.
 
     Attributes:
-        key: in JSON.
-        label: in the table.
+        key: name in snake_case, the same in every report.
         value: None where it is not defined (no edges, no area).
-        unit: in words.
-        group: heading in the table.
+        unit: ``"length"``, that of the vertices; ``"area"``, its square; ``"1 / length"``; ``"degrees"``;
+            ``"dimensionless"``.
+        group: ``"mesh"``, ``"energies"``, ``"energies per area"`` or ``"shape"``.
     """
 
     key: str
-    label: str
     value: float | int | None
-    unit: str
+    unit: Unit
     group: str
 
 
@@ -58,9 +55,9 @@ class EdgeMeasures:
     Attributes:
         edge: its number in the topology.
         vertices: numbers of its ends.
-        length: in length units of the file.
+        length: in the unit of the vertices.
         dihedral_angle_degrees: signed, positive where convex.
-        angle_variation: ``l |a|``, in length units of the file.
+        angle_variation: ``l |a|``, in the unit of the vertices.
     """
 
     edge: int
@@ -71,12 +68,42 @@ class EdgeMeasures:
 
 
 def measure_mesh(vertices: Tensor, topology: Topology) -> list[Quantity]:
-    """All quantities of one mesh ``(V, 3)``, in the order of the table."""
+    """All quantities of one mesh: counts, energies, energies per area, shape.
+
+    Example::
+
+        numbers = {quantity.key: quantity.value for quantity in measure_mesh(vertices, topology)}
+        numbers["normal_variation"], numbers["smallest_corner_angle_degrees"]
+
+    Args:
+        vertices: positions ``(V, 3)`` in any length unit.
+        topology: connectivity; any polygons, mixed.
+
+    Returns:
+        The quantities, always the same ones in the same order. Values that are not defined, such as the mean length
+        of no edges, are None. Faces without area and isolated vertices are counted and have no other influence.
+
+    Raises:
+        ShapeError: if ``vertices`` are not one mesh that fits the topology.
+    """
+    vertices = one_mesh(vertices, topology)
     return [*_counts(vertices, topology), *_energies(vertices, topology), *_shape(vertices, topology)]
 
 
 def worst_edges(vertices: Tensor, topology: Topology, count: int) -> list[EdgeMeasures]:
-    """The ``count`` interior edges with the largest ``l |a|``, largest first, ties by edge number."""
+    """The ``count`` interior edges with the largest ``l |a|``, largest first, ties by edge number.
+
+    Args:
+        vertices: positions ``(V, 3)`` in any length unit.
+        topology: connectivity; any polygons, mixed.
+        count: at most so many, 0 or more.
+
+    Raises:
+        ShapeError: if ``vertices`` are not one mesh that fits the topology, or ``count`` is negative.
+    """
+    vertices = one_mesh(vertices, topology)
+    if count < 0:
+        raise ShapeError("count", "0 or more", count)
     values = energies.angle_variation_per_edge(vertices, topology)
     chosen = values.argsort(descending=True, stable=True)[:count]
     columns = (
@@ -93,19 +120,19 @@ def worst_edges(vertices: Tensor, topology: Topology, count: int) -> list[EdgeMe
 def _counts(vertices: Tensor, topology: Topology) -> list[Quantity]:
     used = int((topology.valences > 0).sum())
     counts = {
-        "vertices": ("vertices", topology.num_vertices),
-        "isolated_vertices": ("vertices without a face", topology.num_vertices - used),
-        "edges": ("edges", topology.num_edges),
-        "boundary_edges": ("edges on the boundary", topology.num_edges - topology.num_interior_edges),
-        "faces": ("faces", topology.num_faces),
-        "triangles": ("triangles among them", int((topology.face_sizes == 3).sum())),
-        "quads": ("quads among them", int((topology.face_sizes == 4).sum())),
-        "degenerate_faces": ("faces without area", int(geometry.degenerate_faces(vertices, topology).sum())),
-        "boundary_loops": ("boundary loops", topology.loop_offsets.shape[0] - 1),
-        "components": ("connected components", count_components(topology)),
-        "euler_characteristic": ("Euler characteristic", used - topology.num_edges + topology.num_faces),
+        "vertices": topology.num_vertices,
+        "isolated_vertices": topology.num_vertices - used,
+        "edges": topology.num_edges,
+        "boundary_edges": topology.num_edges - topology.num_interior_edges,
+        "faces": topology.num_faces,
+        "triangles": int((topology.face_sizes == 3).sum()),
+        "quads": int((topology.face_sizes == 4).sum()),
+        "degenerate_faces": int(geometry.degenerate_faces(vertices, topology).sum()),
+        "boundary_loops": topology.loop_offsets.shape[0] - 1,
+        "components": count_components(topology),
+        "euler_characteristic": used - topology.num_edges + topology.num_faces,
     }
-    return [Quantity(key, label, value, NUMBER, "mesh") for key, (label, value) in counts.items()]
+    return [Quantity(key, value, "dimensionless", "mesh") for key, value in counts.items()]
 
 
 def count_components(topology: Topology) -> int:
@@ -130,11 +157,10 @@ def _energy(key: str) -> Callable[[Tensor, Topology], Tensor]:
 def _energies(vertices: Tensor, topology: Topology) -> list[Quantity]:
     area = float(geometry.face_areas(vertices, topology).sum())
     values = {key: float(_energy(key)(vertices, topology)) for key in _ENERGIES}
-    rows = [Quantity(key, label, values[key], unit, "energies") for key, (label, unit) in _ENERGIES.items()]
-    for key in (key for key, (_, unit) in _ENERGIES.items() if unit == LENGTH):
-        label = _ENERGIES[key][0][:25].rstrip()
+    rows = [Quantity(key, values[key], unit, "energies") for key, unit in _ENERGIES.items()]
+    for key in (key for key, unit in _ENERGIES.items() if unit == "length"):
         per_area = values[key] / area if area > 0 else None
-        rows.append(Quantity(f"{key}_per_area", label, per_area, PER_LENGTH, "energies per area"))
+        rows.append(Quantity(f"{key}_per_area", per_area, "1 / length", "energies per area"))
     return rows
 
 
@@ -142,32 +168,17 @@ def _shape(vertices: Tensor, topology: Topology) -> list[Quantity]:
     lengths = geometry.edge_lengths(vertices, topology)
     angles = geometry.dihedral_angles(vertices, topology).abs()
     corners = geometry.corner_angles(vertices, topology)
-    deviation = planarity(vertices, topology)
+    deviation = geometry.planarity(vertices, topology)
     total_defect = geometry.angle_defects(vertices, topology).sum()
     any_length, any_angle, any_corner, any_face = (bool(x.numel()) for x in (lengths, angles, corners, deviation))
-    rows = (
-        ("area", "area", float(geometry.face_areas(vertices, topology).sum()), AREA),
-        ("mean_edge_length", "mean edge length", float(lengths.mean()) if any_length else None, LENGTH),
-        ("shortest_edge_length", "shortest edge", float(lengths.min()) if any_length else None, LENGTH),
-        ("longest_edge_length", "longest edge", float(lengths.max()) if any_length else None, LENGTH),
-        (
-            "largest_dihedral_angle_degrees",
-            "largest |dihedral angle|",
-            math.degrees(float(angles.max())) if any_angle else None,
-            DEGREES,
-        ),
-        (
-            "smallest_corner_angle_degrees",
-            "smallest corner angle",
-            math.degrees(float(corners.min())) if any_corner else None,
-            DEGREES,
-        ),
-        (
-            "largest_planarity",
-            "largest planarity (diagonal distance / mean edge)",
-            float(deviation.max()) if any_face else None,
-            NUMBER,
-        ),
-        ("angle_defect_sum_degrees", "sum of angle defects", math.degrees(float(total_defect)), DEGREES),
+    rows: tuple[tuple[str, float | None, Unit], ...] = (
+        ("area", float(geometry.face_areas(vertices, topology).sum()), "area"),
+        ("mean_edge_length", float(lengths.mean()) if any_length else None, "length"),
+        ("shortest_edge_length", float(lengths.min()) if any_length else None, "length"),
+        ("longest_edge_length", float(lengths.max()) if any_length else None, "length"),
+        ("largest_dihedral_angle_degrees", math.degrees(float(angles.max())) if any_angle else None, "degrees"),
+        ("smallest_corner_angle_degrees", math.degrees(float(corners.min())) if any_corner else None, "degrees"),
+        ("largest_planarity", float(deviation.max()) if any_face else None, "dimensionless"),
+        ("angle_defect_sum_degrees", math.degrees(float(total_defect)), "degrees"),
     )
-    return [Quantity(key, label, value, unit, "shape") for key, label, value, unit in rows]
+    return [Quantity(*row, "shape") for row in rows]

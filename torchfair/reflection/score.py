@@ -61,6 +61,23 @@ class ReflectionScore:
     window: Tensor
     setup: ReflectionSetup
 
+    def numbers(self) -> dict[str, Tensor | Size]:
+        """What a report holds: the four numbers, those of every view, and what was looked at, without the pictures."""
+        waves = self.setup.stripes.waves
+        lengths = torch.linalg.vector_norm(waves, dim=-1, keepdim=True)
+        return {
+            "score": self.score,
+            "reflection_variation": self.reflection_variation,
+            "rms": self.rms,
+            "wobble": self.wobble,
+            "score_by_view": self.per_view.mean(-1),
+            "compared": self.compared,
+            "view_directions": self.setup.camera.middle_directions,
+            "stripe_directions": waves / lengths,
+            "stripe_frequency": lengths[0, 0] / (2 * torch.pi),
+            "size": self.setup.size,
+        }
+
 
 def reflection_score(
     vertices: Tensor,
