@@ -90,10 +90,10 @@ def draw_labels(path: Path) -> None:
     sheet = Sheet(2 * MARGIN + len(meshes) * CELL, 2 * MARGIN + HEIGHT + CAPTION)
     for column, (words, (vertices, edges)) in enumerate(meshes.items()):
         topology = edges.topology
-        camera = fit_camera(
+        camera, size = fit_camera(
             vertices, towards_eye=(0.1, -0.75, 0.65), up=(0.0, 0.0, 1.0), width=CELL - 24, height=HEIGHT
         )
-        picture = MeshView(vertices, topology, camera)
+        picture = MeshView(vertices, topology, camera, size)
         quiet = quiet_edges(picture)
         colors = torch.where(edges.mask[:, None], torch.tensor(PRINCIPAL), quiet.colors)
         style = EdgeStyle(colors, torch.where(edges.mask, 2.4, quiet.widths), order=edges.mask.int(), opacity=0.85)
@@ -118,10 +118,10 @@ def draw_strips(path: Path) -> None:
     ]
     both = Topology.from_faces(faces)
     width = 2 * CELL
-    camera = fit_camera(
+    camera, size = fit_camera(
         vertices, towards_eye=(0.5, -0.8, 0.6), up=(0.0, 0.0, 1.0), width=width - 24, height=HEIGHT + 140
     )
-    picture = MeshView(vertices, both, camera)
+    picture = MeshView(vertices, both, camera, size)
     base = torch.tensor(FRONT).repeat(both.num_faces, 1).double()
     base[mesh.topology.num_faces :] = torch.tensor(STRIP).double()
     body = HEIGHT + 140

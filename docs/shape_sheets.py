@@ -57,10 +57,10 @@ def write_sheet(path: Path, meshes: dict[str, ShapeMesh], columns: int) -> None:
     for number, (words, mesh) in enumerate(meshes.items()):
         left, top = MARGIN + number % columns * CELL, MARGIN + number // columns * (PICTURE_HEIGHT + CAPTION)
         view = view_direction(mesh.vertices, mesh.topology)
-        camera = fit_camera(
+        camera, size = fit_camera(
             mesh.vertices, towards_eye=view.towards_eye, up=view.up, width=CELL - 24, height=PICTURE_HEIGHT
         )
-        picture = MeshView(mesh.vertices, mesh.topology, camera)
+        picture = MeshView(mesh.vertices, mesh.topology, camera, size)
         colors = shade_faces(mesh.vertices, mesh.topology, camera)
         sheet.image(picture.paint(colors, edges=quiet_edges(picture)), left + 12, top)
         sheet.text(words, left + CELL / 2, top + PICTURE_HEIGHT + CAPTION / 2, 19, ha="center", va="center")

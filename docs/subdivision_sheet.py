@@ -52,11 +52,11 @@ def main() -> None:
         "catmull_clark, 2 levels": refine(topology, "catmull_clark", 2, corners=corners),
     }
     view = view_direction(vertices, topology)
-    camera = fit_camera(vertices, towards_eye=view.towards_eye, up=view.up, width=CELL - 24, height=HEIGHT)
+    camera, size = fit_camera(vertices, towards_eye=view.towards_eye, up=view.up, width=CELL - 24, height=HEIGHT)
     sheet = Sheet(2 * MARGIN + len(steps) * CELL, 2 * MARGIN + HEIGHT + CAPTION)
     for column, (words, step) in enumerate(steps.items()):
         fine = step.apply(vertices)
-        picture = MeshView(fine, step.topology, camera)
+        picture = MeshView(fine, step.topology, camera, size)
         quiet = quiet_edges(picture)
         labelled = step.carry_edge_labels(labels)
         colors = torch.where(labelled[:, None], torch.tensor([0.75, 0.22, 0.17]), quiet.colors)

@@ -29,9 +29,7 @@ import torch
 from torch import Tensor
 
 from torchfair import Topology, TorchfairError
-from torchfair.cli.plain import to_json
-from torchfair.cli.report import versions
-from torchfair.io import atomic_write_bytes, atomic_write_text, save_mesh
+from torchfair.io import atomic_write_bytes, atomic_write_text, save_mesh, to_json, versions
 
 Report = dict[str, Any]
 T = TypeVar("T")

@@ -12,6 +12,7 @@ from _common import Report, Results
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair.cameras import Camera
 from torchfair.formfinding import strip_normals
 from torchfair.formfinding.symmetric.design import SymmetricDesign
 from torchfair.geometry import edge_lengths
@@ -24,7 +25,7 @@ from torchfair.principal import (
     strip_limits,
 )
 from torchfair.shapes import ShapeMesh
-from torchfair.viewing import Camera, EdgeStyle, MeshView, ViewDirection, fit_camera
+from torchfair.viewing import EdgeStyle, MeshView, ViewDirection, fit_camera
 from torchfair.viewing.shading import FRONT, shade_faces
 from torchfair.viewing.sheet import CAPTION, GAP, MARGIN, Sheet, points
 from torchfair.viewing.wireframe import line_width
@@ -139,7 +140,7 @@ def strip_colors(strips: DevelopableStrips) -> Tensor:
     return _STRIPS[strips.polylines % len(_STRIPS)]
 
 
-def strips_picture(level: Level, strips: DevelopableStrips, camera: Camera) -> Tensor:
+def strips_picture(level: Level, strips: DevelopableStrips, camera: Camera, size: tuple[int, int]) -> Tensor:
     """Strips standing on the mesh, (height, width, 3)."""
     count = level.topology.num_vertices
     quads = (strips.topology.corners.view(-1, 4) + count).tolist()
@@ -148,7 +149,7 @@ def strips_picture(level: Level, strips: DevelopableStrips, camera: Camera) -> T
     owner = torch.repeat_interleave(torch.arange(len(strips.names)), strips.offsets.diff() - 1)
     white = torch.tensor(FRONT).expand(level.topology.num_faces, 3)
     colors = torch.cat([white, strip_colors(strips)[owner]]).to(torch.float64)
-    view = MeshView(vertices, together, camera)
+    view = MeshView(vertices, together, camera, size)
     widths = torch.where((together.edges < count).all(1), 0.4, 0.7)
     widths[(together.edges % count == together.edges).any(1) & (together.edges >= count).any(1)] = 0.0
     style = EdgeStyle(torch.tensor([0.15, 0.18, 0.24]), widths, opacity=0.5)
@@ -172,15 +173,15 @@ def draw_sheet(sheet: Sheet, strips: DevelopableStrips, left: float, top: float,
 def strips_page(level: Level, strips: DevelopableStrips, view: ViewDirection, width: int) -> Sheet:
     """Strips on the mesh, and beside it laid flat."""
     half = (width - 2 * MARGIN - GAP) // 2
-    camera = fit_camera(
+    camera, size = fit_camera(
         level.vertices, strips.vertices, towards_eye=view.towards_eye, up=view.up, width=half, margin=0.02
     )
     across, high = strips.sheet
     flat = round(half * high / across)
-    height, left = max(camera.height, flat), MARGIN + half + GAP
+    height, left = max(size[0], flat), MARGIN + half + GAP
     sheet = Sheet(width, CAPTION + height + MARGIN)
     sheet.caption("strips along the principal edges", MARGIN, 0, half)
-    sheet.image(strips_picture(level, strips, camera), MARGIN, CAPTION + (height - camera.height) // 2)
+    sheet.image(strips_picture(level, strips, camera, size), MARGIN, CAPTION + (height - size[0]) // 2)
     sheet.caption("laid flat", left, 0, half)
     draw_sheet(sheet, strips, left, CAPTION + (height - flat) / 2, half)
     return sheet
@@ -189,19 +190,20 @@ def strips_page(level: Level, strips: DevelopableStrips, view: ViewDirection, wi
 def pulls_page(start: Level, design: Level, handles: Handles, view: ViewDirection, width: int) -> Sheet:
     """Start and design with their principal edges, and how the handles were pulled."""
     half = (width - 2 * MARGIN - GAP) // 2
-    camera = fit_camera(
+    camera, size = fit_camera(
         start.vertices, design.vertices, towards_eye=view.towards_eye, up=view.up, width=half, margin=0.02
     )
-    sheet = Sheet(width, CAPTION + camera.height + MARGIN // 2)
+    sheet = Sheet(width, CAPTION + size[0] + MARGIN // 2)
     pulled = list(handles)
     for column, (name, level) in enumerate({"start": start, "design": design}.items()):
-        mesh, left = MeshView(level.vertices, level.topology, camera), MARGIN + column * (half + GAP)
+        mesh, left = MeshView(level.vertices, level.topology, camera, size), MARGIN + column * (half + GAP)
         faces = shade_faces(level.vertices, level.topology, camera)
         picture = mesh.paint(faces, edges=principal_style(mesh, level.principal.mask))
         seen = visible_vertices(mesh)[pulled]
         before, after = (vertices[pulled][seen] for vertices in (start.vertices, level.vertices))
+        places = lambda points: camera.project(points, size)[0, :, :2]  # noqa: E731
         sheet.caption(name, left, 0, half)
-        sheet.image(mark_pulls(picture, camera, before, after, 0.008 * half), left, CAPTION)
+        sheet.image(mark_pulls(picture, places(before), places(after), 0.008 * half), left, CAPTION)
     return sheet
 
 
@@ -228,9 +230,9 @@ def visible_vertices(view: MeshView) -> Tensor:
     return seen
 
 
-def mark_pulls(picture: Tensor, camera: Camera, start: Tensor, end: Tensor, size: float) -> Tensor:
-    """The picture with a dot at every end (n, 3), and a line to it from every start (n, 3); sizes in pixels."""
-    for a, b in zip(camera.project(start)[:, :2], camera.project(end)[:, :2], strict=True):
+def mark_pulls(picture: Tensor, start: Tensor, end: Tensor, size: float) -> Tensor:
+    """The picture with a dot at every end (n, 2), and a line to it from every start (n, 2); all in pixels."""
+    for a, b in zip(start, end, strict=True):
         picture = _stroke(picture, a, b, 0.22 * size, _PULL)
         picture = _stroke(picture, b, b, size + 1.5, torch.ones(3))
         picture = _stroke(picture, b, b, size, _PULL)

@@ -9,11 +9,12 @@ import torch
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.reflection import EquirectangularImage, PerspectiveCamera, SmoothReference, render_reflection
+from torchfair.cameras import Camera
+from torchfair.reflection import EquirectangularImage, SmoothReference, Stripes, render_reflection
 from torchfair.reflection.environments import Environment
 from torchfair.shapes import ShapeMesh
-from torchfair.viewing import Camera, EdgeStyle, MeshView
-from torchfair.viewing.shading import STRIPES_DARK, STRIPES_LIGHT
+from torchfair.viewing import EdgeStyle, MeshView
+from torchfair.viewing.shading import stripe_colors
 from torchfair.viewing.sheet import CAPTION, FAINT_TEXT, GAP, MARGIN, Sheet
 from torchfair.viewing.wireframe import line_width
 
@@ -38,31 +39,27 @@ def smooth_mirror(reference: SmoothReference) -> Mirror:
     return Mirror(reference.vertices, reference.topology, reference.normals)
 
 
-def mirror_picture(mirror: Mirror, camera: Camera, environment: Environment, *, joints: float = 0.0) -> Tensor:
+def mirror_picture(
+    mirror: Mirror, camera: Camera, size: tuple[int, int], environment: Environment, *, joints: float = 0.0
+) -> Tensor:
     """Colours (height, width, 3) on white paper; ``joints`` is the opacity of lines along the edges of panels."""
-    views = PerspectiveCamera(
-        camera.eye,
-        camera.eye - camera.axes[2],
-        2 * math.degrees(math.atan(camera.width / (2 * camera.scale))),
-        camera.axes[1],
-    )
     picture = render_reflection(
         mirror.vertices,
         mirror.topology,
-        views,
+        camera,
         environment,
-        size=(camera.height, camera.width),
+        size=size,
         supersampling=_SAMPLES,
         shading="flat" if mirror.normals is None else "smooth",
         normals=mirror.normals,
     )
     colors = picture.image[0].movedim(0, -1) + (1 - picture.coverage[0])[..., None]
-    return colors.clamp(0, 1) * _lines(mirror, camera, joints)
+    return colors.clamp(0, 1) * _lines(mirror, camera, size, joints)
 
 
-def _lines(mirror: Mirror, camera: Camera, opacity: float) -> Tensor:
+def _lines(mirror: Mirror, camera: Camera, size: tuple[int, int], opacity: float) -> Tensor:
     """White with dark lines where the joints are and along the boundary."""
-    view = MeshView(mirror.vertices, mirror.topology, camera, supersampling=_SAMPLES)
+    view = MeshView(mirror.vertices, mirror.topology, camera, size, supersampling=_SAMPLES)
     topology = mirror.topology
     inner = line_width(view, 0.03, 0.3, 1.0) if opacity > 0 and mirror.normals is None else 0.0
     widths = torch.full((topology.num_edges,), inner, dtype=torch.float64)
@@ -99,15 +96,8 @@ def panels(rows: list[list[Tensor]], width: int, captions: dict[str, list[str]])
 
 def striped(waves: Tensor, frequency: float, sharpness: float = 6.0) -> Environment:
     """Dark and light stripes across one direction, in the colours of all pictures of torchfair."""
-    wave = torch.nn.functional.normalize(waves.to(torch.float64), dim=-1)
-
-    def colors(directions: Tensor) -> Tensor:
-        phase = 2 * math.pi * frequency * (directions @ wave.to(directions))
-        value = 0.5 + 0.5 * torch.tanh(sharpness * torch.sin(phase))
-        dark, light = (directions.new_tensor(color) for color in (STRIPES_DARK, STRIPES_LIGHT))
-        return torch.lerp(dark, light, value[..., None])
-
-    return colors
+    stripes = Stripes(waves, frequency, sharpness)
+    return lambda directions: stripe_colors(stripes(directions)[..., 0])
 
 
 def evening_sky(height: int = 512) -> EquirectangularImage:

@@ -10,10 +10,11 @@ from _mirrors import Mirror, mirror_picture, panel_width, panels, smooth_mirror,
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair.cameras import Camera
 from torchfair.energies import normal_variation
 from torchfair.reflection import ReflectionSetup, SmoothReference, reflection_score
 from torchfair.subdivision import loop
-from torchfair.viewing import Camera, ViewDirection, fit_camera
+from torchfair.viewing import ViewDirection, fit_camera
 
 Mesh = tuple[Tensor, Topology]
 SMOOTH = "smooth reference"
@@ -66,24 +67,24 @@ def draw_reflections(
     file: str,
     meshes: dict[str, Mesh],
     reference: SmoothReference,
-    cameras: list[Camera],
+    cameras: list[tuple[Camera, tuple[int, int]]],
     captions: dict[str, list[str]],
     look: Look,
     results: Results,
 ) -> None:
-    """A column for every mesh and the smooth reference, a row for every camera."""
+    """A column for every mesh and the smooth reference, a row for every camera and its picture size."""
     mirrors = [*(Mirror(*mesh) for mesh in meshes.values()), smooth_mirror(reference)]
     stripes = striped(WAVES, look.frequency)
     pictures = [
-        [mirror_picture(mirror, camera, stripes, joints=look.joints) for mirror in mirrors] for camera in cameras
+        [mirror_picture(mirror, *camera, stripes, joints=look.joints) for mirror in mirrors] for camera in cameras
     ]
     panels(pictures, look.width, captions).write(results.path(file), overwrite=results.force)
 
 
 def whole_and_near(
     reference: SmoothReference, near: Tensor, view: ViewDirection, width: int, columns: int
-) -> list[Camera]:
-    """A camera that sees the whole surface, and one that sees the vertices of the mask ``near``."""
+) -> list[tuple[Camera, tuple[int, int]]]:
+    """Cameras that see the whole surface, and the vertices of the mask ``near``, each with the size of its picture."""
     panel = panel_width(width, columns)
     towards, up = view
     height = round(_PANEL * panel)

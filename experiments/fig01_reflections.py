@@ -67,12 +67,12 @@ def experiment(config: Config, results: Results) -> Report:
 
 def draw(config: Config, mirrors: dict[str, Mirror], report: dict[str, Report], results: Results) -> None:
     """Two rows of four pictures."""
-    camera = fit_camera(
+    camera, pixels = fit_camera(
         mirrors[SMOOTH].vertices, towards_eye=torch.tensor([1.0, -0.35, 0.32]), up=torch.tensor([0, 0, 1.0]),
         width=panel_width(config.width, len(mirrors)), margin=0.02,
     )  # fmt: skip
     surroundings = (evening_sky(), striped(torch.tensor([0.0, 0, 1]), config.frequency))
-    rows = [[mirror_picture(mirror, camera, around, joints=config.joints) for mirror in mirrors.values()]
+    rows = [[mirror_picture(mirror, camera, pixels, around, joints=config.joints) for mirror in mirrors.values()]
             for around in surroundings]  # fmt: skip
     words = {SMOOTH: f"$C$ = {SURFACE.total_absolute_curvature():.1f}"}
     words |= {name: f"$E$ = {row['normal_variation']:.1f},  score {row['score']:.3f}" for name, row in report.items()}

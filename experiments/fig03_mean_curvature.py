@@ -151,8 +151,8 @@ def draw_fields(config: Config, reports: dict[str, Report], results: Results) ->
     panel = (config.width - 2 * MARGIN - GAP) // 2
     meshes = [inscribed(config, turned, config.drawn) for turned in LATTICES.values()]
     above, north = torch.tensor([0.0, 0, 1]), torch.tensor([0.0, 1, 0])
-    camera = fit_camera(*(v for v, _ in meshes), towards_eye=above, up=north, width=panel)
-    sheet = Sheet(config.width, 3 * CAPTION + camera.height + MARGIN)
+    camera, size = fit_camera(*(v for v, _ in meshes), towards_eye=above, up=north, width=panel)
+    sheet = Sheet(config.width, 3 * CAPTION + size[0] + MARGIN)
     for column, (name, (vertices, topology), file) in enumerate(zip(LATTICES, meshes, MESHES, strict=True)):
         computed, exact = field(vertices, topology)
         ratio = (computed * exact).sum(1) / (exact * exact).sum(1)
@@ -162,10 +162,10 @@ def draw_fields(config: Config, reports: dict[str, Report], results: Results) ->
         report = reports[name][f"{config.drawn:g}"]
         sheet.caption(name, left, 0, panel)
         sheet.caption(f"error of $H$: {100 * report['error']['all']:.0f} %", left, CAPTION, panel)
-        sheet.image(MeshView(vertices, topology, camera).paint_vertices(colors), left, 2 * CAPTION)
+        sheet.image(MeshView(vertices, topology, camera, size).paint_vertices(colors), left, 2 * CAPTION)
         results.mesh(file, vertices, topology)
     words = "computed over exact mean curvature: white 1, red 2 and more, blue 0 and less"
-    sheet.text(words, config.width / 2, 2.5 * CAPTION + camera.height, 22, ha="center", va="center")
+    sheet.text(words, config.width / 2, 2.5 * CAPTION + size[0], 22, ha="center", va="center")
     sheet.write(results.path(PICTURE), overwrite=results.force)
 
 

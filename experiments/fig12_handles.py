@@ -182,16 +182,16 @@ def draw_meshes(
     first = next(iter(meshes.values()))
     towards_eye, up = view_direction(first, topology)
     panel = (config.width - 2 * MARGIN - 2 * GAP) // 3
-    camera = fit_camera(*meshes.values(), towards_eye=towards_eye, up=up, width=panel)
-    sheet = Sheet(config.width, 2 * CAPTION + camera.height + panel + 3 * MARGIN)
+    camera, size = fit_camera(*meshes.values(), towards_eye=towards_eye, up=up, width=panel)
+    sheet = Sheet(config.width, 2 * CAPTION + size[0] + panel + 3 * MARGIN)
     images = [gauss_image(vertices, topology) for vertices in meshes.values()]
     vertical = torch.tensor([0.0, 0, 1], dtype=torch.float64)
     sphere = fit_sphere_view(*(image.points for image in images), towards_eye=vertical, up=towards_eye)
-    below = CAPTION + camera.height + MARGIN
+    below = CAPTION + size[0] + MARGIN
     for column, (name, vertices) in enumerate(meshes.items()):
         left, report, image = MARGIN + column * (panel + GAP), measured[column], images[column]
         sheet.caption(f"{name}:  $E$ = {report['normal_variation']:.4g}", left, 0, panel)
-        mesh = MeshView(vertices, topology, camera)
+        mesh = MeshView(vertices, topology, camera, size)
         sheet.image(mesh.paint(shade_faces(vertices, topology, camera), edges=_handle_edges(mesh)), left, CAPTION)
         words = f"folded {report['folded_solid_angle']:.3f} of {report['solid_angle_of_pyramids']:.2f} sr"
         sheet.caption(words, left, below, panel)

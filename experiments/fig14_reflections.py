@@ -74,12 +74,13 @@ def experiment(config: Config, results: Results) -> Report:
 
 def draw(config: Config, mirrors: list[list[Mirror]], report: dict[str, dict[str, Report]], results: Results) -> None:
     """A row of pictures for each level."""
-    camera = fit_camera(
+    camera, pixels = fit_camera(
         mirrors[0][-1].vertices, towards_eye=torch.tensor([-1.0, 0.15, 0.08]), up=torch.tensor([0, 0, 1.0]),
         width=panel_width(config.width, len(mirrors[0])), margin=0.02,
     )  # fmt: skip
     stripes = striped(torch.tensor([0.25, 0.35, 1.0]), config.frequency)
-    pictures = [[mirror_picture(mirror, camera, stripes, joints=config.joints) for mirror in row] for row in mirrors]
+    pictures = [[mirror_picture(mirror, camera, pixels, stripes, joints=config.joints) for mirror in row]
+                for row in mirrors]  # fmt: skip
     captions = {SMOOTH: [f"$C$ = {SURFACE.total_absolute_curvature():.2f}"]}
     for name, levels in report.items():
         energies = ", ".join(f"{row['normal_variation']:.2f}" for row in levels.values())

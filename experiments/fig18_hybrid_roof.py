@@ -20,12 +20,12 @@ from _common import ExperimentConfig, Report, Results, run_experiment, setting
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair.cameras import Camera
 from torchfair.constraints.lifted_normal_variation import lifted_blocks
 from torchfair.formfinding import FairResult, FairSettings, minimise_normal_variation
 from torchfair.geometry import edge_lengths
 from torchfair.shapes import hybrid_roof
 from torchfair.viewing import (
-    Camera,
     EdgeStyle,
     MeshView,
     fit_camera,
@@ -135,34 +135,36 @@ def comparison_table(topology: Topology, reports: dict[str, Report]) -> str:
 def draw_overlay(original: Tensor, final: Tensor, topology: Topology, width: int, results: Results) -> None:
     """The final mesh with the edges of the original in red over it, and a closer look at the middle."""
     towards_eye, up = view_direction(original, topology)
-    camera = fit_camera(original, final, towards_eye=towards_eye, up=up, width=width - 2 * MARGIN)
+    camera, size = fit_camera(original, final, towards_eye=towards_eye, up=up, width=width - 2 * MARGIN)
     middle = (final - final.mean(0)).norm(dim=1) < 0.17 * (final - final.mean(0)).norm(dim=1).max()
     panel = (width - 2 * MARGIN - 2 * GAP) // 3
-    close = fit_camera(
+    close, close_size = fit_camera(
         final[middle], towards_eye=towards_eye, up=up, width=panel, height=round(0.8 * panel), margin=0.0
     )
-    sheet = Sheet(width, camera.height + close.height + 2 * CAPTION + MARGIN)
+    sheet = Sheet(width, size[0] + close_size[0] + 2 * CAPTION + MARGIN)
     sheet.caption("final mesh, the original in red", 0, 0, width)
-    sheet.image(paint_overlay(final, original, topology, camera), MARGIN, CAPTION)
-    below = CAPTION + camera.height
+    sheet.image(paint_overlay(final, original, topology, camera, size), MARGIN, CAPTION)
+    below = CAPTION + size[0]
     closer = {"original": (original, None), "final": (final, None), "final, the original in red": (final, original)}
     for column, (name, (vertices, other)) in enumerate(closer.items()):
         left = MARGIN + column * (panel + GAP)
         sheet.caption(name, left, below, panel)
-        sheet.image(paint_overlay(vertices, other, topology, close), left, below + CAPTION)
+        sheet.image(paint_overlay(vertices, other, topology, close, close_size), left, below + CAPTION)
     sheet.write(results.path(OVERLAY), overwrite=results.force)
 
 
-def paint_overlay(vertices: Tensor, other: Tensor | None, topology: Topology, camera: Camera) -> Tensor:
+def paint_overlay(
+    vertices: Tensor, other: Tensor | None, topology: Topology, camera: Camera, size: tuple[int, int]
+) -> Tensor:
     """A shaded mesh with dark edges, and the visible edges of another one of the same topology in red."""
-    mesh = MeshView(vertices, topology, camera)
+    mesh = MeshView(vertices, topology, camera, size)
     shaded = shade_faces(vertices, topology, camera)
     picture = mesh.paint(shaded, edges=EdgeStyle(INK, 1.1))
     if other is None:
         return picture
-    fine = camera.enlarged(mesh.supersampling)
-    lifted = other + 0.2 * edge_lengths(other, topology).mean() * camera.towards_eye(other)  # not hidden by the mesh
-    both = torch.cat([mesh.points, fine.project(lifted)])
+    height = 0.2 * edge_lengths(other, topology).mean()
+    lifted = other - height * camera.view_directions(other)[0]  # not hidden by the mesh
+    both = torch.cat([mesh.points, camera.project(lifted, mesh.samples)[0]])
     surface = Surface(both, mesh.triangulation.triangles, mesh.triangle_index)
     widths = torch.full((topology.num_edges,), 1.2 * mesh.supersampling)
     covered = (visible_lines(surface, topology.edges + topology.num_vertices, widths) >= 0).to(torch.float32)

@@ -187,13 +187,13 @@ def draw_meshes(
     setup = ReflectionSetup.for_reference(reference)
     mirrors = {name: Mirror(vertices, mesh.topology) for name, vertices in positions.items()}
     mirrors["smooth surface"] = smooth_mirror(reference)
-    camera = fit_camera(
+    camera, pixels = fit_camera(
         reference.vertices, towards_eye=-setup.camera.axes[0, 2], up=setup.camera.axes[0, 1],
         width=panel_width(config.width, len(mirrors)), margin=0.02,
     )  # fmt: skip
     waves = setup.stripes.waves
     frequency = float(torch.linalg.vector_norm(waves[0])) / (2 * math.pi)
-    rows = [[mirror_picture(m, camera, striped(wave, frequency), joints=0.4) for m in mirrors.values()]
+    rows = [[mirror_picture(m, camera, pixels, striped(wave, frequency), joints=0.4) for m in mirrors.values()]
             for wave in waves[:2]]  # fmt: skip
     values = {START: report[BOTH]["start"]} | {kind: report[kind]["end"] for kind in LOSSES}
     captions = {name: [f"score {values[name]['score']:.3f},  $E$ = {values[name]['normal_variation']:.2f}"]

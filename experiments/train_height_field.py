@@ -27,9 +27,10 @@ from torch import Tensor, nn
 
 from torchfair import Topology
 from torchfair.energies import NormalVariation
+from torchfair.reflection import Stripes, face_mirror_directions
 from torchfair.shapes import Paraboloid, parameter_triangles
 from torchfair.viewing import MeshView, fit_camera, view_direction
-from torchfair.viewing.shading import mirror_directions, shade_faces, stripe_colors, stripe_frequency, stripe_values
+from torchfair.viewing.shading import shade_faces, stripe_colors, stripe_frequency
 from torchfair.viewing.sheet import CAPTION, GAP, MARGIN, Sheet
 from torchfair.viewing.wireframe import outline, quiet_edges
 
@@ -206,18 +207,19 @@ def draw_surfaces(meshes: dict[str, Tensor], problem: Problem, width: int, resul
     exact = meshes["the saddle"]
     towards_eye, up = view_direction(exact, topology)
     panel = (width - 2 * MARGIN - (len(meshes) - 1) * GAP) // len(meshes)
-    camera = fit_camera(*meshes.values(), towards_eye=towards_eye, up=up, width=panel)
-    axis = camera.axes[0].to(exact)
-    frequency = stripe_frequency(mirror_directions(exact, topology, camera) @ axis, topology)
-    sheet = Sheet(width, CAPTION + 2 * camera.height + 2 * MARGIN)
+    camera, size = fit_camera(*meshes.values(), towards_eye=towards_eye, up=up, width=panel)
+    across = camera.axes[0, 0]
+    frequency = stripe_frequency(face_mirror_directions(exact, topology, camera)[0] @ across, topology)
+    stripes = Stripes(across, frequency)
+    sheet = Sheet(width, CAPTION + 2 * size[0] + 2 * MARGIN)
     for column, (name, vertices) in enumerate(meshes.items()):
         left = MARGIN + column * (panel + GAP)
         sheet.caption(f"{name}:  $E$ = {float(energy(vertices)):.3g}", left, 0, panel)
-        mesh = MeshView(vertices, topology, camera)
+        mesh = MeshView(vertices, topology, camera, size)
         sheet.image(mesh.paint(shade_faces(vertices, topology, camera), edges=quiet_edges(mesh)), left, CAPTION)
-        stripes = stripe_values(mirror_directions(vertices, topology, camera) @ axis, frequency)
-        mirror = mesh.paint(stripe_colors(stripes), edges=outline(mesh))
-        sheet.image(mirror, left, CAPTION + camera.height + MARGIN)
+        values = stripes(face_mirror_directions(vertices, topology, camera)[0])[:, 0]
+        mirror = mesh.paint(stripe_colors(values), edges=outline(mesh))
+        sheet.image(mirror, left, CAPTION + size[0] + MARGIN)
     sheet.write(results.path(PICTURE), overwrite=results.force)
 
 

@@ -10,8 +10,9 @@ from helpers import DOUBLE
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair.cameras import Camera, OrthographicCamera, PerspectiveCamera
 from torchfair.geometry import face_normals, vertex_normals
-from torchfair.reflection import Camera, OrthographicCamera, PerspectiveCamera, Stripes, mirror_directions
+from torchfair.reflection import Stripes, mirror_directions
 from torchfair.triangulation import triangulate
 
 STRIPES = Stripes(torch.tensor([[1.0, 0.3, 0.2], [0.1, -0.4, 1.0]]), 1.0, 2.0)
@@ -48,7 +49,7 @@ def ray_cast(vertices: Tensor, topology: Topology, camera: Camera, size: int) ->
     inside = torch.ones_like(distance, dtype=torch.bool)
     for start, stop in ((a, b), (b, c), (c, a)):
         inside &= (torch.linalg.cross((stop - start).expand_as(places), places - start) * normal).sum(-1) >= 0
-    if camera.near is not None:
+    if camera.central:
         inside &= distance > 0
     distance = torch.where(inside, distance, torch.inf)
     face = torch.where(inside.any(1), cut.faces[distance.argmin(1)], -1)
@@ -77,7 +78,7 @@ def exact_functional(
     areas = (ax * by - ay * bx).abs() / 2
     normals = face_normals(vertices, topology)[:, None]
     if smooth:
-        in_space = shares if camera.near is None else shares * -projected[..., 2][:, None]
+        in_space = shares * -projected[..., 2][:, None] if camera.central else shares
         normals = torch.einsum("...qk,fkd->fqd", in_space, vertex_normals(vertices, topology)[topology.triangles])
         normals = torch.nn.functional.normalize(normals, dim=-1)
     rays = mirror_directions(camera.directions_at(places[None], 1)[0], normals)

@@ -4,15 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
-import torch
-from helpers import DOUBLE, wavy_grid
 from star_tools import random_arms, stars_of
 
-from torchfair import Topology
 from torchfair.cli import main
-from torchfair.cli.diagnosis import counts, describe_vertex, diagnose_mesh, per_vertex, worst_vertices
 from torchfair.io import save_mesh
-from torchfair.stars import StarKind, classify_stars, gauss_overlaps, pyramid_self_intersections
 
 KEYS = ("convex", "saddle", "neither", "good_saddle", "self_intersecting_pyramids")
 CUBE_OBJ = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1)) + (
@@ -33,46 +28,6 @@ def read_json(text: str) -> dict[str, object]:
 
     found: dict[str, object] = json.loads(text, parse_constant=refuse)
     return found
-
-
-def test_numbers_are_those_of_the_library() -> None:
-    vertices, topology = wavy_grid(9, 9, triangles=True)
-    diagnosis = diagnose_mesh(vertices, topology)
-    numbers = counts(diagnosis)
-    classes = classify_stars(vertices, topology)
-    for kind in (StarKind.CONVEX, StarKind.SADDLE, StarKind.NEITHER):
-        assert numbers[kind.name.lower()] == int(classes.is_kind(kind).sum())
-    assert numbers["convex"] + numbers["saddle"] + numbers["neither"] == numbers["inner_vertices"] == 49
-    assert numbers["good_saddle"] + numbers["bad_saddle"] == numbers["saddle"]
-    folded = pyramid_self_intersections(vertices, topology)
-    assert numbers["self_intersecting_pyramids"] == int((folded > 0).sum())
-    assert numbers["pyramid_self_intersections"] == int(folded.sum())
-    assert sum(numbers["self_intersecting_pyramids_by_class"].values()) == numbers["self_intersecting_pyramids"]
-    assert numbers["gauss_image_crossings"] == gauss_overlaps(vertices, topology).crossings
-    assert sum(numbers["ordinary_patterns"].values()) == numbers["inner_vertices"]
-    assert sum(numbers["pyramid_windings"].values()) == numbers["inner_vertices"]
-    lists = per_vertex(diagnosis)
-    assert {len(entries) for entries in lists.values()} == {81}
-    for name in ("convex", "saddle", "neither"):
-        assert lists["class"].count(name) == numbers[name]
-    assert lists["class"].count("boundary") == numbers["boundary_vertices"]
-
-
-def test_worst_vertices_come_first_and_good_ones_never() -> None:
-    diagnosis = diagnose_mesh(*wavy_grid(9, 9, triangles=True))
-    rows = worst_vertices(diagnosis, 1000)
-    crossings = [row["self_intersections"] for row in rows]
-    assert crossings == sorted(crossings, reverse=True)
-    assert {row["class"] for row in rows if not row["self_intersections"]} <= {"bad saddle", "neither"}
-    assert worst_vertices(diagnosis, 3) == rows[:3]
-    assert rows[0] == describe_vertex(diagnosis, rows[0]["vertex"])
-
-
-def test_mesh_without_inner_vertices_and_isolated_ones() -> None:
-    vertices = torch.tensor([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], dtype=DOUBLE)
-    numbers = counts(diagnose_mesh(vertices, Topology.from_faces([[0, 1, 2]], num_vertices=4)))
-    assert (numbers["inner_vertices"], numbers["boundary_vertices"], numbers["isolated_vertices"]) == (0, 3, 1)
-    assert numbers["mean_pyramid_perimeter_degrees"] is None
 
 
 def test_json(stars_file: str, capsys: pytest.CaptureFixture[str]) -> None:

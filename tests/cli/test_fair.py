@@ -116,7 +116,7 @@ def test_unreadable_input_and_unknown_example(tmp_path: Path, capsys: pytest.Cap
 def test_interruption_writes_the_best_mesh(
     roof: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from torchfair.cli.progress import ProgressDisplay
+    from torchfair.progress import ProgressDisplay
 
     original = ProgressDisplay.__call__
 

@@ -7,7 +7,6 @@ import pytest
 from PIL import Image
 
 from torchfair.cli import main
-from torchfair.cli.reflect import numbers
 from torchfair.io import load_mesh, save_mesh
 from torchfair.reflection import reflection_score
 from torchfair.shapes import PrincipalParaboloid, irregular_triangles, principal_quads
@@ -48,7 +47,7 @@ def test_numbers_are_those_of_the_library(
     for options, surface in (([], None), (["--reference", reference_file], (reference.vertices, reference.topology))):
         assert main(["reflect", mesh_file, "--json", "--size", "64", *options]) == 0
         report = read_json(capsys.readouterr().out)
-        expected = numbers(reflection_score(mesh.vertices, mesh.topology, surface, size=64))
+        expected = reflection_score(mesh.vertices, mesh.topology, surface, size=64).numbers()
         assert {key: report[key] for key in KEYS} == {key: float(expected[key]) for key in KEYS}
         assert all(report[key] > 0 for key in KEYS)  # type: ignore[operator]
         assert len(report["score_by_view"]) == 6  # type: ignore[arg-type]
@@ -129,7 +128,7 @@ def test_interruption_leaves_whole_files_only(
     def stop(*arguments: object, **options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("torchfair.cli.frames.frame_progress", stop)
+    monkeypatch.setattr("torchfair.progress.frame_progress", stop)
     folder = tmp_path / "out"
     assert main(["reflect", mesh_file, "-o", str(folder), *FEW_PIXELS]) == 130
     assert "interrupted" in capsys.readouterr().err

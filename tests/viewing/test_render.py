@@ -5,13 +5,14 @@ import torch
 from helpers import DOUBLE, cube, grid_faces, wavy_grid
 
 from torchfair import ShapeError, Topology
-from torchfair.viewing.camera import Camera, fit_camera
+from torchfair.cameras import OrthographicCamera
+from torchfair.viewing.camera import fit_camera
 from torchfair.viewing.lines import EdgeStyle
 from torchfair.viewing.render import MeshView
 
 UP = torch.tensor([0.0, 0, 1], dtype=DOUBLE)
 ASLANT = torch.tensor([1.0, -2, 1.5], dtype=DOUBLE)
-FRONTAL = Camera(torch.zeros(3, dtype=DOUBLE), torch.eye(3, dtype=DOUBLE), 1.0, False, 12, 8)
+FRONTAL = (OrthographicCamera(-UP, half_widths=6.0, ups=torch.tensor([0.0, 1, 0])), (8, 12))
 
 
 def plate(width: float, height: float) -> tuple[torch.Tensor, Topology]:
@@ -27,7 +28,7 @@ def plate(width: float, height: float) -> tuple[torch.Tensor, Topology]:
 
 @pytest.mark.parametrize("supersampling", [1, 2, 3])
 def test_colours_arrive_unchanged_and_count_exactly(supersampling: int) -> None:
-    mesh = MeshView(*plate(8, 4), FRONTAL, supersampling=supersampling)
+    mesh = MeshView(*plate(8, 4), *FRONTAL, supersampling=supersampling)
     colors = torch.tensor([[0.25, 0.5, 0.75], [1.0, 0, 0.125]])
     picture = mesh.paint(colors, background=(0.0, 1.0, 0.0))
     assert picture.shape == (8, 12, 3)
@@ -40,7 +41,7 @@ def test_colours_arrive_unchanged_and_count_exactly(supersampling: int) -> None:
 def test_partly_covered_pixels_are_averages() -> None:
     """A face that covers the left third of a pixel column gives it a third of its colour."""
     vertices, topology = plate(8 + 2 / 3, 4)
-    picture = MeshView(vertices, topology, FRONTAL).paint(torch.zeros(2, 3), background=(1.0, 1.0, 1.0))
+    picture = MeshView(vertices, topology, *FRONTAL).paint(torch.zeros(2, 3), background=(1.0, 1.0, 1.0))
     assert torch.allclose(picture[3, 1], torch.full((3,), 2 / 3))
     assert torch.allclose(picture[3, 10], torch.full((3,), 2 / 3))
 
@@ -49,18 +50,18 @@ def test_partly_covered_pixels_are_averages() -> None:
 def test_vertex_colours_are_affine_on_the_surface(field_of_view: float) -> None:
     """Colours that are an affine function of position appear as that function where the ray meets the surface."""
     vertices, topology = plate(2, 1)
-    camera = fit_camera(vertices, towards_eye=ASLANT, up=UP, width=60, height=40, field_of_view=field_of_view)
-    mesh = MeshView(vertices, topology, camera, supersampling=1)
+    camera, size = fit_camera(vertices, towards_eye=ASLANT, up=UP, width=60, height=40, field_of_view=field_of_view)
+    mesh = MeshView(vertices, topology, camera, size, supersampling=1)
     picture = mesh.paint_vertices(0.5 + 0.4 * vertices)
     rows, columns = torch.nonzero(mesh.face_index >= 0).unbind(1)
     places = (picture[rows, columns].to(DOUBLE) - 0.5) / 0.4
-    projected = camera.project(places)[:, :2]
+    projected = camera.project(places, size)[0, :, :2]
     assert torch.allclose(projected, torch.stack([columns + 0.5, rows + 0.5], dim=1).to(DOUBLE), atol=1e-3)
     assert places[:, 2].abs().max() < 1e-5
 
 
 def test_vertex_colours_take_shades_and_background() -> None:
-    mesh = MeshView(*plate(8, 4), FRONTAL)
+    mesh = MeshView(*plate(8, 4), *FRONTAL)
     picture = mesh.paint_vertices(torch.ones(6, 3), face_shades=torch.tensor([0.5, 0.25]), background=(1, 0, 0))
     assert torch.allclose(picture[3, 3], torch.full((3,), 0.5))
     assert torch.allclose(picture[3, 8], torch.full((3,), 0.25))
@@ -73,7 +74,7 @@ def test_edges_have_their_colour_width_and_opacity() -> None:
     colors[0] = torch.tensor([1.0, 0, 0])  # the one interior edge, between the plates
     widths = torch.zeros(topology.num_edges)
     widths[0] = 2.0
-    mesh = MeshView(vertices, topology, FRONTAL)
+    mesh = MeshView(vertices, topology, *FRONTAL)
     for opacity in (1.0, 0.25):
         picture = mesh.paint(torch.full((2, 3), 0.5), edges=EdgeStyle(colors, widths, opacity=opacity))
         expected = opacity * colors[0] + (1 - opacity) * 0.5
@@ -83,8 +84,8 @@ def test_edges_have_their_colour_width_and_opacity() -> None:
 
 def test_edge_order_decides_what_is_on_top() -> None:
     vertices, topology = cube()
-    camera = fit_camera(vertices, towards_eye=ASLANT, up=UP, width=40, height=40)
-    mesh = MeshView(vertices, topology, camera, supersampling=1)
+    camera, size = fit_camera(vertices, towards_eye=ASLANT, up=UP, width=40, height=40)
+    mesh = MeshView(vertices, topology, camera, size, supersampling=1)
     colors = torch.linspace(0, 1, 12)[:, None].expand(12, 3)
     white = torch.ones(6, 3)
     up = mesh.paint(white, edges=EdgeStyle(colors, 3.0, torch.arange(12)))
@@ -96,16 +97,16 @@ def test_edge_order_decides_what_is_on_top() -> None:
 
 def test_the_same_mesh_gives_the_same_picture() -> None:
     vertices, topology = wavy_grid()
-    camera = fit_camera(vertices, towards_eye=ASLANT, up=UP, width=80, height=60)
+    camera, size = fit_camera(vertices, towards_eye=ASLANT, up=UP, width=80, height=60)
     colors = torch.linspace(0, 1, 3 * topology.num_faces).view(-1, 3)
     first, second = (
-        MeshView(vertices, topology, camera).paint(colors, edges=EdgeStyle(torch.zeros(3), 1.0)) for _ in range(2)
+        MeshView(vertices, topology, camera, size).paint(colors, edges=EdgeStyle(torch.zeros(3), 1.0)) for _ in range(2)
     )
     assert torch.equal(first, second)
 
 
 def test_an_empty_mesh_is_background() -> None:
-    mesh = MeshView(torch.zeros(3, 3), Topology.from_faces([], 3), FRONTAL)
+    mesh = MeshView(torch.zeros(3, 3), Topology.from_faces([], 3), *FRONTAL)
     nothing = torch.zeros(0, 3)
     picture = mesh.paint(nothing, edges=EdgeStyle(torch.zeros(3), 1.0))
     assert torch.equal(picture, torch.ones(8, 12, 3))
@@ -115,4 +116,4 @@ def test_an_empty_mesh_is_background() -> None:
 def test_batches_are_refused() -> None:
     vertices, topology = plate(8, 4)
     with pytest.raises(ShapeError, match="not a batch"):
-        MeshView(vertices[None], topology, FRONTAL)
+        MeshView(vertices[None], topology, *FRONTAL)

@@ -5,16 +5,18 @@ import torch
 from helpers import DOUBLE, cube, grid_faces, tetrahedron, wavy_grid
 
 from torchfair import Topology
+from torchfair.cameras import Camera
 from torchfair.geometry import dihedral_angles, edge_vectors
-from torchfair.viewing.camera import Camera, fit_camera
+from torchfair.reflection import face_mirror_directions
+from torchfair.viewing.camera import fit_camera
 from torchfair.viewing.shading import (
     BACK,
     FRONT,
-    mirror_directions,
+    STRIPES_DARK,
+    STRIPES_LIGHT,
     shade_faces,
     stripe_colors,
     stripe_frequency,
-    stripe_values,
     towards_viewer,
 )
 
@@ -23,7 +25,7 @@ UP = torch.tensor([0.0, 0, 1], dtype=DOUBLE)
 
 
 def camera_for(vertices: torch.Tensor, field_of_view: float = 0.0) -> Camera:
-    return fit_camera(vertices, towards_eye=ASLANT, up=UP, width=64, height=48, field_of_view=field_of_view)
+    return fit_camera(vertices, towards_eye=ASLANT, up=UP, width=64, height=48, field_of_view=field_of_view)[0]
 
 
 def flat_grid() -> tuple[torch.Tensor, Topology]:
@@ -75,9 +77,9 @@ def test_mirrored_directions_differ_by_twice_the_sine_of_the_fold() -> None:
     """|r_f - r_f'| = 2 |sin a| sin(angle between sight and edge), exactly, for a distant eye."""
     for vertices, topology in (wavy_grid(triangles=True), tetrahedron(), cube()):
         camera = camera_for(vertices)
-        left, right = mirror_directions(vertices, topology, camera)[topology.interior_edge_faces].unbind(1)
+        left, right = face_mirror_directions(vertices, topology, camera)[0][topology.interior_edge_faces].unbind(1)
         edges = torch.nn.functional.normalize(edge_vectors(vertices, topology)[: topology.num_interior_edges], dim=1)
-        across = torch.linalg.vector_norm(torch.linalg.cross(edges, camera.axes[2].expand_as(edges)), dim=1)
+        across = torch.linalg.vector_norm(torch.linalg.cross(edges, camera.axes[0, 2].expand_as(edges)), dim=1)
         expected = 2 * dihedral_angles(vertices, topology).sin().abs() * across
         assert torch.allclose(torch.linalg.vector_norm(left - right, dim=1), expected, atol=1e-12)
 
@@ -86,8 +88,8 @@ def test_mirrors_are_sign_blind_and_keep_length() -> None:
     vertices, topology = wavy_grid()
     turned = Topology.from_faces([face[::-1] for face in topology.face_lists()])
     camera = camera_for(vertices, 40.0)
-    mirrored = mirror_directions(vertices, topology, camera)
-    assert torch.allclose(mirrored, mirror_directions(vertices, turned, camera))
+    mirrored = face_mirror_directions(vertices, topology, camera)[0]
+    assert torch.allclose(mirrored, face_mirror_directions(vertices, turned, camera)[0])
     assert torch.allclose(torch.linalg.vector_norm(mirrored, dim=1), torch.ones(topology.num_faces, dtype=DOUBLE))
 
 
@@ -96,17 +98,14 @@ def test_faces_without_area_have_finite_colours_and_reflect_nothing() -> None:
     topology = Topology.from_faces([[0, 1, 2], [0, 2, 3]])
     camera = camera_for(vertices)
     assert bool(torch.isfinite(shade_faces(vertices, topology, camera)).all())
-    assert torch.allclose(mirror_directions(vertices, topology, camera)[0], -camera.axes[2])
+    assert torch.allclose(face_mirror_directions(vertices, topology, camera)[0][0], camera.axes[0, 2])
 
 
-def test_stripes_are_periodic_soft_and_symmetric() -> None:
-    x = torch.linspace(-1, 1, 101, dtype=DOUBLE)
-    values = stripe_values(x, 2.5)
-    assert values.min() >= 0
-    assert values.max() <= 1
-    assert torch.allclose(stripe_values(x + 1 / 2.5, 2.5), values)
-    assert torch.allclose(values + stripe_values(-x, 2.5), torch.ones_like(x))
-    assert stripe_colors(values).shape == (101, 3)
+def test_colours_of_stripes_run_from_dark_to_light() -> None:
+    colors = stripe_colors(torch.tensor([0.0, 0.5, 1.0]))
+    assert colors.shape == (3, 3)
+    assert torch.allclose(colors[[0, 2]], torch.tensor([STRIPES_DARK, STRIPES_LIGHT]))
+    assert torch.allclose(colors[1], colors[[0, 2]].mean(0))
 
 
 def test_stripe_frequency_follows_spread_and_steps() -> None:

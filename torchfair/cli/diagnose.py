@@ -7,15 +7,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..io.json_text import to_json
 from .arguments import count
 from .errors import CommandError
 from .inputs import read_input
 from .outputs import refuse_existing
-from .plain import to_json
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
-    from .diagnosis import Diagnosis
+    from ..measuring import Diagnosis
 
 NAME = "torchfair diagnose"
 PICTURES = ("classes.png", "pyramids.png", "gauss_image.png")
@@ -67,16 +67,16 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Checks what can be checked first, then reads, judges, writes and prints."""
-    from .diagnosis import counts, diagnose_mesh, per_vertex, worst_vertices
+    from ..measuring import diagnose_mesh
 
     files = _files(arguments)
     mesh = read_input(arguments.input, arguments.repair)
     _check_vertices(arguments.vertex, mesh)
     diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
-    numbers, worst = counts(diagnosis), worst_vertices(diagnosis, arguments.worst)
+    numbers, worst = diagnosis.counts(), diagnosis.worst_vertices(arguments.worst)
     report = {**numbers, "file": arguments.input, "repairs": list(mesh.repairs), "worst_vertices": worst}
     if arguments.per_vertex:
-        report["per_vertex"] = per_vertex(diagnosis)
+        report["per_vertex"] = diagnosis.per_vertex()
     if files:
         write(files, mesh, diagnosis, report, arguments)
     if arguments.json:

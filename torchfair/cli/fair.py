@@ -81,7 +81,7 @@ def solve(
 ) -> tuple[JobResult[Level], FairSettings]:
     """Runs the job with a progress display."""
     from ..formfinding import minimise_normal_variation
-    from .progress import ProgressDisplay
+    from ..progress import ProgressDisplay
 
     settings = read_settings(arguments)
     handles = dict(vertex_target(*words) for words in arguments.handle)

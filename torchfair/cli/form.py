@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
 def solve(start: FormInput, handles: dict[int, list[float]], settings: FormSettings, levels: int) -> FormResult:
     """Runs the job with a progress display."""
     from ..formfinding import minimise_absolute_curvature
-    from .progress import ProgressDisplay
+    from ..progress import ProgressDisplay
 
     with ProgressDisplay(settings.projection.max_iterations) as display:
         return minimise_absolute_curvature(

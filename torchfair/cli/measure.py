@@ -6,18 +6,53 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
+from ..io.json_text import to_json
 from .arguments import count
 from .inputs import read_input
-from .plain import to_json
 
 if TYPE_CHECKING:
-    from .measurements import EdgeMeasures, Quantity
+    from ..measuring import EdgeMeasures, Quantity
 
 NAME = "torchfair measure"
 _DESCRIPTION = (
     "Prints the energies E and E', curvature, area, lengths and angles of a polygon mesh with their units, and the "
     "edges that spoil its smoothness most."
 )
+_UNITS = {
+    "length": "length units of the file",
+    "area": "square length units of the file",
+    "1 / length": "1 / length unit of the file",
+}
+_LABELS = {
+    "vertices": "vertices",
+    "isolated_vertices": "vertices without a face",
+    "edges": "edges",
+    "boundary_edges": "edges on the boundary",
+    "faces": "faces",
+    "triangles": "triangles among them",
+    "quads": "quads among them",
+    "degenerate_faces": "faces without area",
+    "boundary_loops": "boundary loops",
+    "components": "connected components",
+    "euler_characteristic": "Euler characteristic",
+    "normal_variation": "E   normal variation       sum l l*",
+    "angle_variation": "E'  angle variation        sum l |a|",
+    "total_mean_curvature": "    total mean curvature   1/2 sum l a",
+    "total_absolute_curvature": "C   absolute curvature     sum |k1| + |k2|",
+    "total_absolute_curvature_corrected": "C   the same, corrected    by vertex normals",
+    "total_frobenius_curvature": "C2  Frobenius curvature    sum sqrt(k1^2 + k2^2)",
+    "umbrella_fairness": "    umbrella fairness",
+    "polyline_fairness": "    polyline fairness",
+    "area": "area",
+    "mean_edge_length": "mean edge length",
+    "shortest_edge_length": "shortest edge",
+    "longest_edge_length": "longest edge",
+    "largest_dihedral_angle_degrees": "largest |dihedral angle|",
+    "smallest_corner_angle_degrees": "smallest corner angle",
+    "largest_planarity": "largest planarity (diagonal distance / mean edge)",
+    "angle_defect_sum_degrees": "sum of angle defects",
+}
+_NAME = 25  # columns of a label before its formula
 
 
 def add_parser(subparsers: Any) -> None:
@@ -38,7 +73,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, measures, prints."""
-    from .measurements import measure_mesh, worst_edges
+    from ..measuring import measure_mesh, worst_edges
 
     mesh = read_input(arguments.input, arguments.repair)
     quantities = measure_mesh(mesh.vertices, mesh.topology)
@@ -47,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
         entries = {
             "file": arguments.input,
             "repairs": list(mesh.repairs),
-            "units": {quantity.key: quantity.unit for quantity in quantities},
+            "units": {quantity.key: _unit(quantity) for quantity in quantities},
             "worst_edges": worst,
         }
         sys.stdout.write(to_json({**{quantity.key: quantity.value for quantity in quantities}, **entries}))
@@ -62,15 +97,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 def format_quantities(quantities: list[Quantity]) -> str:
     """The quantities as lines of text under their headings; counts and pure numbers go without a unit."""
-    width = max(len(quantity.label) for quantity in quantities)
+    labels = [_label(quantity) for quantity in quantities]
+    width = max(map(len, labels))
     lines = []
     group = None
-    for quantity in quantities:
+    for quantity, label in zip(quantities, labels, strict=True):
         if quantity.group != group:
             group = quantity.group
             lines += ["", group]
-        unit = "" if quantity.unit == "dimensionless" else f"  {quantity.unit}"
-        lines.append(f"  {quantity.label:<{width}}  {_number(quantity.value):>12}{unit}")
+        unit = "" if quantity.unit == "dimensionless" else f"  {_unit(quantity)}"
+        lines.append(f"  {label:<{width}}  {_number(quantity.value):>12}{unit}")
     return "\n".join(lines)
 
 
@@ -86,6 +122,17 @@ def format_edges(edges: list[EdgeMeasures]) -> str:
         numbers = (edge.length, edge.dihedral_angle_degrees, edge.angle_variation)
         lines.append(f"  {edge.edge:>9} {ends:>19} " + " ".join(f"{_number(x):>12}" for x in numbers))
     return "\n".join(lines)
+
+
+def _label(quantity: Quantity) -> str:
+    """What a quantity is called in the table; an energy per area by the name of the energy, without its formula."""
+    if quantity.unit == "1 / length":
+        return _LABELS[quantity.key.removesuffix("_per_area")][:_NAME].rstrip()
+    return _LABELS[quantity.key]
+
+
+def _unit(quantity: Quantity) -> str:
+    return _UNITS.get(quantity.unit, quantity.unit)
 
 
 def _number(value: float | int | None) -> str:

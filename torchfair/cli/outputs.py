@@ -62,8 +62,7 @@ class Outputs:
 
         Polylines become line elements of an OBJ file.
         """
-        from ..io import save_mesh
-        from .report import write_report
+        from ..io import save_mesh, write_report
 
         run = result.projection
         save_mesh(self.mesh, result.vertices, topology, overwrite=arguments.force, polylines=polylines)

@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..io.json_text import to_json
 from .arguments import count, positive_count, positive_or_none
 from .errors import CommandError
 from .inputs import read_input
 from .outputs import refuse_existing
-from .plain import to_json
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     reference = read_input(arguments.reference, arguments.repair) if arguments.reference else None
     with threads_for(0, mesh.vertices.device):  # pictures of this size are made of very short operations
         score = _score(mesh, reference, arguments)
-        report = numbers(score)
+        report: dict[str, Any] = dict(score.numbers())
         report |= {"file": arguments.input, "reference": arguments.reference, "repairs": list(mesh.repairs)}
         if files:
             write(files, mesh, score, report, arguments)
@@ -80,23 +80,6 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"{arguments.input}\n{format_numbers(report)}")
     print("".join(f"wrote {path}\n" for path in files), end="")
     return 0
-
-
-def numbers(score: ReflectionScore) -> dict[str, Any]:
-    """What the JSON holds: the four numbers, those of every view, and what was looked at."""
-    import torch
-
-    setup = score.setup
-    waves = torch.linalg.vector_norm(setup.stripes.waves, dim=-1, keepdim=True)
-    return {
-        **{key: getattr(score, key) for key in _ROWS},
-        "score_by_view": score.per_view.mean(-1),
-        "compared": score.compared,
-        "view_directions": setup.camera.axes[:, 2],
-        "stripe_directions": setup.stripes.waves / waves,
-        "stripe_frequency": waves[0, 0] / (2 * torch.pi),
-        "size": setup.size,
-    }
 
 
 def format_numbers(report: dict[str, Any]) -> str:
@@ -125,9 +108,9 @@ def write(
     atomic_write_text(files[0], to_json(report), overwrite=arguments.force)
     if len(files) == 1:
         return
+    from ..progress import frame_progress
     from ..viewing.picture_reflections import picture_reflection_differences, picture_reflections
     from ..viewing.turntable import turntable
-    from .frames import frame_progress
 
     name = Path(arguments.input).name
     picture_reflections(files[1], score, name, overwrite=arguments.force)

@@ -100,7 +100,7 @@ def solve(
 ) -> SymmetricResult:
     """Runs the job with a progress display."""
     from ..formfinding import principal_symmetric
-    from .progress import ProgressDisplay
+    from ..progress import ProgressDisplay
 
     fixed = vertex_mask("--fix", arguments.fix, mesh)
     on = polyline_vertices(arguments.on, mesh, edges) if arguments.on else None

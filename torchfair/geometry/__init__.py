@@ -5,6 +5,7 @@ from .angles import corner_angles as corner_angles
 from .areas import face_area_vectors as face_area_vectors
 from .areas import face_areas as face_areas
 from .balanced_normals import balanced_normals as balanced_normals
+from .centres import face_centres as face_centres
 from .closest_curve_point import ClosestCurvePoints as ClosestCurvePoints
 from .closest_curve_point import ReferenceCurve as ReferenceCurve
 from .closest_curve_point import ReferenceCurves as ReferenceCurves

@@ -1,6 +1,8 @@
 """Reflections of meshes: their variation in closed form, pictures, and the score of a picture."""
 
-from .camera import Camera as Camera
+from ..cameras import Camera as Camera
+from ..cameras import OrthographicCamera as OrthographicCamera
+from ..cameras import PerspectiveCamera as PerspectiveCamera
 from .default_views import default_camera as default_camera
 from .default_views import default_stripe_directions as default_stripe_directions
 from .edge_visibility import edge_visibility as edge_visibility
@@ -9,9 +11,8 @@ from .environments import Environment as Environment
 from .environments import EquirectangularImage as EquirectangularImage
 from .environments import Stripes as Stripes
 from .loss import ReflectionLoss as ReflectionLoss
+from .mirror import face_mirror_directions as face_mirror_directions
 from .mirror import mirror_directions as mirror_directions
-from .orthographic_camera import OrthographicCamera as OrthographicCamera
-from .perspective_camera import PerspectiveCamera as PerspectiveCamera
 from .render import Reflection as Reflection
 from .render import render_reflection as render_reflection
 from .score import ReflectionScore as ReflectionScore

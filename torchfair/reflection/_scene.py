@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from ..cameras import Camera, Size
 from ..geometry._ops import cross, dot
 from ..topology import Topology
 from ..triangulation import triangulate
 from ._clip import clip_edges, clip_triangles
 from ._seams import edge_faces
-from .camera import Camera, Size
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def _folds(local: Tensor, triangles: Tensor, faces: Tensor, camera: Camera) -> t
         return triangles.new_zeros(0, 2), triangles.new_zeros(0, 2), triangles.new_zeros(0)
     a, b, c = local[triangles].unbind(-2)
     area = cross(b - a, c - a)
-    facing = area[..., 2] if camera.near is None else dot(a, area)
+    facing = dot(a, area) if camera.central else area[..., 2]
     picture, number = torch.nonzero(facing[:, inner] * facing[:, inner + 1] < 0).unbind(1)
     second = inner[number] + 1
     return triangles[picture, second, :2], faces[second, None].expand(-1, 2), picture

@@ -8,11 +8,11 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from ..cameras import Camera, Size
 from ..errors import ShapeError
 from ..geometry._ops import gather
 from ..geometry.normals import normalise
 from ._scene import Scene
-from .camera import Camera, Size
 from .environments import Environment
 from .mirror import mirror_directions
 
@@ -66,7 +66,7 @@ class ConstantShader:
     uses_places = False
 
     def __init__(self, scene: Scene, normals: Tensor, around: Surroundings) -> None:
-        directions = around.camera.axes[:, 2].to(normals)
+        directions = around.camera.middle_directions.to(normals)
         colors = around.mirrored(directions[:, None], normals.unsqueeze(1))  # (meshes, views, F, channels + 1)
         table = colors.reshape(-1, colors.shape[-1])
         rows = scene.pictures * normals.shape[1] + scene.faces
@@ -107,8 +107,7 @@ class PlaceShader:
         corners = gather(self._scene.points.to(torch.float64), points)
         first, second, third = (corner - places for corner in corners[..., :2].unbind(1))
         weights = torch.stack([_wedge(second, third), _wedge(third, first), _wedge(first, second)], dim=-1)
-        if self._around.camera.near is not None:
-            weights = weights * -corners[..., 2]  # depth is -1 / distance
+        weights = self._around.camera.weights_in_space(weights, corners[..., 2])
         # Only the direction of the sum counts, and the sign of a normal does not: no division by the area.
         total = (weights[..., None] * gather(self._normals, points)).sum(1)
         return normalise(total, 1e-12 * weights.detach().abs().sum(-1)).to(self._normals)

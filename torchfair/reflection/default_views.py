@@ -7,10 +7,10 @@ import math
 import torch
 from torch import Tensor
 
+from ..cameras import OrthographicCamera
+from ..cameras.fitting import look_axes
 from ..geometry import face_area_vectors
 from ..geometry._ops import norm
-from ..rasterisation.camera_fit import look_axes
-from .orthographic_camera import OrthographicCamera
 from .smooth_reference import SmoothReference
 from .view_directions import axis_directions, cone_directions
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from ..cameras.camera import Camera, Size, check_camera, height_and_width
 from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals
 from ..geometry._ops import dot
@@ -12,7 +13,6 @@ from ..rasterisation.planes import plane_depths
 from ..rasterisation.rasterise import visible_triangles
 from ..topology import Topology
 from ..triangulation import triangulate
-from .camera import Camera, Size, height_and_width
 
 _SLACK = (1.5, 1e-3)
 """What is not counted as in front: pixels along the slope of the nearest triangle, and a part of the depth range."""
@@ -44,7 +44,9 @@ def edge_visibility(
     Raises:
         ShapeError: if ``vertices`` is not one mesh that fits the topology, or for a size without pixels.
         TorchfairError: if a vertex is not finite.
+        TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
     """
+    check_camera(camera)
     topology.check_vertices(vertices)
     if vertices.ndim != 2:
         raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3), not a batch", tuple(vertices.shape))

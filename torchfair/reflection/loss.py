@@ -7,12 +7,12 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from ..cameras import Camera, Size
 from ..energies.base import MeshModule
 from ..errors import TorchfairError
 from ..geometry import face_areas
 from ..topology import Topology
 from ._comparison import comparison_window, dissimilarity
-from .camera import Camera, Size
 from .setup import ReflectionSetup
 from .smooth_reference import Reference
 from .variation import reflection_variation
@@ -70,7 +70,7 @@ class ReflectionLoss(MeshModule):
         if not variation_weight >= 0:
             raise TorchfairError(f"variation_weight must be at least 0, got {variation_weight}")
         if isinstance(reference, ReflectionSetup):
-            setup = replace(reference, size=size)
+            setup = reference if reference.size == size else replace(reference, size=size)  # which renders anew
         else:
             setup = ReflectionSetup.for_reference(
                 reference, camera=camera, stripe_directions=stripe_directions, frequency=frequency, size=size

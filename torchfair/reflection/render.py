@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 from torch.autograd.forward_ad import unpack_dual
 
+from ..cameras.camera import Camera, Size, check_camera, height_and_width
 from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals, vertex_normals
 from ..rasterisation import visible_triangles
@@ -18,7 +19,6 @@ from ._edge_terms import edge_terms
 from ._samples import coarse_pixels, mean_colors
 from ._scene import build_scene
 from ._shading import ConstantShader, PlaceShader, Shader, Surroundings
-from .camera import Camera, Size, height_and_width
 from .environments import Environment
 
 Shading = Literal["flat", "smooth"]
@@ -93,6 +93,7 @@ def render_reflection(
     Raises:
         ShapeError: if a tensor has the wrong shape, or the size is below one pixel.
         TorchfairError: if a vertex is not finite, or for an unknown shading or a supersampling below 1.
+        TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
     """
     draw = _checked
     if torch.compiler.is_compiling():  # left to eager mode: sizes depend on what is seen
@@ -112,6 +113,7 @@ def _checked(
     normals: Tensor | None,
     background: Tensor | float,
 ) -> Reflection:
+    check_camera(camera)
     topology.check_vertices(vertices)
     height, width = height_and_width(size)
     if not bool(torch.isfinite(vertices).all()):
@@ -164,9 +166,11 @@ def _render(
     """Colours and coverage (meshes, views, H W, channels + 1), and face numbers of the samples."""
     camera, (height, width) = around.camera, height_and_width(around.size)
     scene = build_scene(meshes, topology, camera, around.size)
-    shade: Shader = ConstantShader(scene, normals, around)
-    if smooth or camera.near is not None:
+    shade: Shader
+    if smooth or camera.central:
         shade = PlaceShader(scene, normals, around, smooth=smooth)
+    else:
+        shade = ConstantShader(scene, normals, around)
     seen = visible_triangles(
         scene.points, scene.triangles, width, height, pictures=scene.pictures, num_pictures=scene.num_pictures
     )

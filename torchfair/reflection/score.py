@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from ..cameras.camera import Camera, Size, height_and_width
 from ..geometry import face_areas
 from ..geometry._ops import norm
 from ..topology import Topology
 from ._comparison import blur, comparison_window, dissimilarity, masked_mean
-from .camera import Camera, Size, height_and_width
 from .edge_visibility import edge_visibility
-from .perspective_camera import PerspectiveCamera
 from .setup import Pictures, ReflectionSetup
 from .smooth_reference import Reference, SmoothReference, one_finite_mesh
 from .variation import reflection_variation
@@ -62,6 +61,23 @@ class ReflectionScore:
     window: Tensor
     setup: ReflectionSetup
 
+    def numbers(self) -> dict[str, Tensor | Size]:
+        """What a report holds: the four numbers, those of every view, and what was looked at, without the pictures."""
+        waves = self.setup.stripes.waves
+        lengths = torch.linalg.vector_norm(waves, dim=-1, keepdim=True)
+        return {
+            "score": self.score,
+            "reflection_variation": self.reflection_variation,
+            "rms": self.rms,
+            "wobble": self.wobble,
+            "score_by_view": self.per_view.mean(-1),
+            "compared": self.compared,
+            "view_directions": self.setup.camera.middle_directions,
+            "stripe_directions": waves / lengths,
+            "stripe_frequency": lengths[0, 0] / (2 * torch.pi),
+            "size": self.setup.size,
+        }
+
 
 def reflection_score(
     vertices: Tensor,
@@ -100,6 +116,7 @@ def reflection_score(
     Raises:
         ShapeError: if a tensor has the wrong shape, for instance a batch.
         TorchfairError: if a vertex is not finite, or for a reference of another kind.
+        TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
     """
     mesh = one_finite_mesh(vertices, topology)
     if isinstance(reference, ReflectionSetup):
@@ -165,10 +182,10 @@ def _variation(vertices: Tensor, topology: Topology, setup: ReflectionSetup) -> 
     height, width = height_and_width(setup.size)
     samples = (height * setup.supersampling, width * setup.supersampling)
     visibility = edge_visibility(vertices, topology, camera, size=samples)
-    if isinstance(camera, PerspectiveCamera):
-        distances = norm(camera.targets - camera.eyes).to(vertices)
-        values = distances * reflection_variation_from_eyes(vertices, topology, camera.eyes, visibility=visibility)
+    if camera.distances is None:
+        values = reflection_variation(vertices, topology, camera.middle_directions, visibility=visibility)
     else:
-        values = reflection_variation(vertices, topology, camera.axes[:, 2], visibility=visibility)
+        from_eyes = reflection_variation_from_eyes(vertices, topology, camera.origins, visibility=visibility)
+        values = camera.distances.to(vertices) * from_eyes
     area = face_areas(vertices, topology).sum()
     return values.mean() / area.sqrt().clamp(min=torch.finfo(area.dtype).tiny)

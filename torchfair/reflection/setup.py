@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
+from ..cameras.camera import Camera, Size, check_camera
 from ..errors import TorchfairError
 from ..topology import Topology
-from .camera import Camera, Size
 from .default_views import default_camera, default_stripe_directions
 from .environments import Stripes
 from .render import render_reflection
@@ -51,6 +51,9 @@ class ReflectionSetup:
         reference: the smooth surface; None to compare every mesh with itself, shaded by its vertex normals.
         size: pixels of the pictures.
         supersampling: samples per pixel along each side.
+
+    Raises:
+        TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
     """
 
     camera: Camera
@@ -58,6 +61,9 @@ class ReflectionSetup:
     reference: SmoothReference | None
     size: Size = 256
     supersampling: int = 3
+
+    def __post_init__(self) -> None:
+        check_camera(self.camera)
 
     @classmethod
     def for_reference(
@@ -84,9 +90,10 @@ class ReflectionSetup:
         Raises:
             ShapeError: if a tensor has the wrong shape.
             TorchfairError: if a vertex is not finite, or a frequency not positive.
+            TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
         """
         surface = smooth_reference(reference)
-        camera = camera or default_camera(surface)
+        camera = default_camera(surface) if camera is None else camera
         waves = default_stripe_directions(surface) if stripe_directions is None else stripe_directions
         if frequency is None:
             frequency = _frequency(surface, camera, waves)
@@ -118,7 +125,7 @@ class ReflectionSetup:
 
     @cached_property
     def reference_pictures(self) -> Pictures:
-        """Pictures of the reference.
+        """Pictures of the reference, rendered at the first call and kept.
 
         Raises:
             TorchfairError: if there is none.

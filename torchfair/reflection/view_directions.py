@@ -7,8 +7,8 @@ import math
 import torch
 from torch import Tensor
 
+from ..cameras.fitting import look_axes
 from ..errors import ShapeError, TorchfairError
-from ..rasterisation.camera_fit import look_axes
 
 
 def axis_directions(rotation: Tensor | None = None) -> Tensor:

@@ -5,9 +5,7 @@ Importing this package imports neither matplotlib nor PIL; they are loaded when 
 
 from ..rasterisation.rasterise import Fragments as Fragments
 from ..rasterisation.rasterise import rasterise as rasterise
-from .camera import Camera as Camera
 from .camera import fit_camera as fit_camera
-from .camera import look_axes as look_axes
 from .lines import EdgeStyle as EdgeStyle
 from .picture_before_after import picture_before_after as picture_before_after
 from .picture_curvature import picture_curvature as picture_curvature

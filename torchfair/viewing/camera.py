@@ -1,63 +1,16 @@
-"""Cameras: where the eye is, and how points in space become pixels."""
+"""The camera of a picture: one view, as close as the picture allows."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
+from ..cameras import Camera, OrthographicCamera, PerspectiveCamera
+from ..cameras.camera import check_camera
+from ..cameras.fitting import look_axes, points_to_fit
 from ..errors import ShapeError
-from ..rasterisation.camera_fit import fit_eyes, points_to_fit
-from ..rasterisation.camera_fit import look_axes as axes_of_views
-
-
-@dataclass(frozen=True, eq=False)
-class Camera:
-    """A pinhole or parallel camera with square pixels.
-
-    Attributes:
-        eye: ``(3,)`` position of the eye; for a parallel camera any point on the central line of sight.
-        axes: ``(3, 3)`` orthonormal rows: right, up, and backward (from the scene towards the eye).
-        scale: pixels per unit of length at unit distance (perspective), or anywhere (parallel).
-        perspective: whether distant things look smaller.
-        width: columns of pixels.
-        height: rows of pixels.
-    """
-
-    eye: Tensor
-    axes: Tensor
-    scale: float
-    perspective: bool
-    width: int
-    height: int
-
-    def project(self, vertices: Tensor) -> Tensor:
-        """Pixel coordinates ``(*batch, V, 3)``: x to the right, y down from the top, and depth.
-
-        Depth grows away from the eye and is affine over the screen as
-        :func:`torchfair.viewing.rasterise` asks: distance along the line of sight for a parallel
-        camera, ``-1 / distance`` for perspective. Points at or behind the eye of a perspective camera become NaN,
-        so that triangles with such a corner are left out.
-        """
-        right, up, back = ((vertices - self.eye.to(vertices)) @ self.axes.T.to(vertices)).unbind(-1)
-        if self.perspective:
-            distance = torch.where(back < 0, -back, torch.nan)
-            right, up, depth = right / distance, up / distance, -1 / distance
-        else:
-            depth = -back
-        return torch.stack([self.width / 2 + self.scale * right, self.height / 2 - self.scale * up, depth], dim=-1)
-
-    def towards_eye(self, points: Tensor) -> Tensor:
-        """Unit vectors ``(*batch, 3)`` from points to the eye; the zero vector at the eye itself."""
-        if not self.perspective:
-            return self.axes[2].to(points).expand_as(points)
-        return torch.nn.functional.normalize(self.eye.to(points) - points, dim=-1)
-
-    def enlarged(self, factor: int) -> Camera:
-        """The same view with ``factor`` times as many pixels each way."""
-        return replace(self, scale=self.scale * factor, width=self.width * factor, height=self.height * factor)
 
 
 def fit_camera(
@@ -68,8 +21,8 @@ def fit_camera(
     height: int | None = None,
     field_of_view: float = 24.0,
     margin: float = 0.05,
-) -> Camera:
-    """The closest camera that sees all the given points with some margin.
+) -> tuple[Camera, tuple[int, int]]:
+    """The closest camera that sees all the given points with some margin, and the size of its picture.
 
     Points that are not finite are ignored; without any other the camera looks at the origin. If all points
     coincide the camera stands off by the unit of length.
@@ -83,34 +36,32 @@ def fit_camera(
         field_of_view: angle over the larger side of the picture in degrees, 0 for a parallel camera.
         margin: free part of the picture on every side, below 0.5.
 
+    Returns:
+        A camera with one view, and ``(height, width)`` in pixels.
+
     Raises:
         ShapeError: if ``towards_eye`` is zero or the picture has no pixels.
+        TorchfairError: if ``margin`` is out of range.
     """
-    axes = look_axes(towards_eye, up)
-    points = points_to_fit(vertices)
-    local = points @ axes.T
+    axes = eye_axes(towards_eye, up)
     if height is None:
-        height = _natural_height(local, width)
+        height = _natural_height(points_to_fit(vertices) @ axes.T, width)
     if width < 1 or height < 1:
         raise ShapeError("width and height", "at least one pixel each", (width, height))
-    usable = 1 - 2 * margin
-    size = torch.linalg.vector_norm(local.amax(0) - local.amin(0))
-    reach = float(size) if size > 0 else 1.0
+    size, aspect = (height, width), width / height
     if field_of_view <= 0:
-        centre = (local.amax(0) + local.amin(0)) / 2
-        half = (local.amax(0) - local.amin(0)) / 2
-        sides = torch.stack([2 * half[0] / width, 2 * half[1] / height])
-        scale = usable / max(float(sides.max()), 1e-6 * reach / max(width, height))
-        return Camera(centre @ axes, axes, scale, False, width, height)
-    slope = math.tan(math.radians(field_of_view) / 2)
-    forward = axes * axes.new_tensor([1.0, 1, -1])[:, None]
-    side = axes.new_tensor([slope * width / max(width, height)])
-    eyes, _ = fit_eyes(points, forward[None], side, margin, width / height)
-    return Camera(eyes[0], axes, max(width, height) / (2 * slope), True, width, height)
+        return OrthographicCamera.fit(*vertices, directions=-axes[2], ups=axes[1], margin=margin, aspect=aspect), size
+    across = field_of_view
+    if height > width:
+        across = 2 * math.degrees(math.atan(aspect * math.tan(math.radians(field_of_view) / 2)))
+    fit = PerspectiveCamera.fit(
+        *vertices, directions=-axes[2], ups=axes[1], fields_of_view=across, margin=margin, aspect=aspect
+    )
+    return fit, size
 
 
-def look_axes(towards_eye: Tensor, up: Tensor) -> Tensor:
-    """Orthonormal rows ``(3, 3)``: right, up, backward, for a view from the direction ``towards_eye``.
+def eye_axes(towards_eye: Tensor, up: Tensor) -> Tensor:
+    """Orthonormal rows ``(3, 3)``: right, up, and towards the eye, for a view from the direction ``towards_eye``.
 
     Raises:
         ShapeError: if ``towards_eye`` is zero.
@@ -118,8 +69,21 @@ def look_axes(towards_eye: Tensor, up: Tensor) -> Tensor:
     back = torch.as_tensor(towards_eye, dtype=torch.float64)
     if not torch.linalg.vector_norm(back) > 0:
         raise ShapeError("towards_eye", "a direction (3,) that is not zero", back.tolist())
-    axes = axes_of_views(-back[None], torch.as_tensor(up, dtype=torch.float64)[None])[0]
-    return axes * axes.new_tensor([1.0, 1, -1])[:, None]
+    right, upward, forward = look_axes(-back[None], torch.as_tensor(up, dtype=torch.float64)[None])[0]
+    return torch.stack([right, upward, -forward])
+
+
+def towards_eye(camera: Camera, points: Tensor) -> Tensor:
+    """Unit vectors ``(N, 3)`` from points ``(N, 3)`` to the eye of the only view; the zero vector at the eye itself."""
+    check_one_view(camera)
+    return -camera.view_directions(points)[0]
+
+
+def check_one_view(camera: Camera) -> None:
+    """Raises unless ``camera`` has one view: TypeError for what is no camera, ShapeError for several views."""
+    check_camera(camera)
+    if camera.num_views != 1:
+        raise ShapeError("camera", "one view, such as camera.select(slice(0, 1))", f"{camera.num_views} views")
 
 
 def _natural_height(local: Tensor, width: int) -> int:

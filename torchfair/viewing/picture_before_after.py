@@ -6,11 +6,12 @@ import os
 
 from torch import Tensor
 
+from ..reflection import Stripes, face_mirror_directions
 from ..topology import Topology
 from .camera import fit_camera
 from .captions import energy_caption
 from .render import MeshView, one_mesh
-from .shading import mirror_directions, shade_faces, stripe_colors, stripe_frequency, stripe_values
+from .shading import shade_faces, stripe_colors, stripe_frequency
 from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction
 from .wireframe import outline, quiet_edges
@@ -52,21 +53,22 @@ def picture_before_after(
     before, after = one_mesh(before, topology), one_mesh(after, topology)
     towards_eye, up = view or view_direction(before, topology)
     panel = (width - 2 * MARGIN - GAP) // 2
-    camera = fit_camera(before, after, towards_eye=towards_eye, up=up, width=panel)
-    axis = camera.axes[0].to(before)
-    frequency = stripe_frequency(mirror_directions(before, topology, camera) @ axis, topology)
+    camera, size = fit_camera(before, after, towards_eye=towards_eye, up=up, width=panel)
+    across = camera.axes[0, 0]
+    mirrored = [face_mirror_directions(vertices, topology, camera)[0] for vertices in (before, after)]
+    stripes = Stripes(across, stripe_frequency(mirrored[0] @ across.to(before), topology))
 
-    row = CAPTION + camera.height
+    row = CAPTION + size[0]
     sheet = Sheet(width, 2 * row + MARGIN, title)
     sheet.note("daylight", MARGIN, sheet.top)
     sheet.note("mirror", MARGIN, sheet.top + row)
     captions = energy_caption("before", before, topology), energy_caption("after", after, topology, before)
     for column, (vertices, caption) in enumerate(zip((before, after), captions, strict=True)):
         left = MARGIN + column * (panel + GAP)
-        mesh = MeshView(vertices, topology, camera)
+        mesh = MeshView(vertices, topology, camera, size)
         sheet.caption(caption, left, sheet.top, panel)
         daylight = mesh.paint(shade_faces(vertices, topology, camera), edges=quiet_edges(mesh))
         sheet.image(daylight, left, sheet.top + CAPTION)
-        stripes = stripe_values(mirror_directions(vertices, topology, camera) @ axis, frequency)
-        sheet.image(mesh.paint(stripe_colors(stripes), edges=outline(mesh)), left, sheet.top + row + CAPTION)
+        colors = stripe_colors(stripes(mirrored[column])[:, 0])
+        sheet.image(mesh.paint(colors, edges=outline(mesh)), left, sheet.top + row + CAPTION)
     return sheet.write(path, overwrite=overwrite)

@@ -12,7 +12,7 @@ from ..energies import total_absolute_curvature_per_vertex
 from ..errors import ShapeError
 from ..geometry import vertex_areas
 from ..topology import Topology
-from .camera import Camera, fit_camera
+from .camera import fit_camera
 from .captions import literal
 from .color_scale import BAR, ColorScale
 from .render import MeshView, one_mesh
@@ -65,25 +65,24 @@ def picture_curvature(
     scale = ColorScale.of(torch.cat(values), r"$|\kappa_1| + |\kappa_2|$", color_map="Blues", lightest=0.0)
     panel = (width - 2 * MARGIN - BAR - (len(meshes) - 1) * GAP) // len(meshes)
     towards_eye, up = view or view_direction(vertices[-1], topologies[-1])
-    camera = fit_camera(*vertices, towards_eye=towards_eye, up=up, width=panel)
+    camera, size = fit_camera(*vertices, towards_eye=towards_eye, up=up, width=panel)
 
-    row = CAPTION + camera.height
-    sheet = Sheet(width, row + camera.height + MARGIN, title)
+    row = CAPTION + size[0]
+    sheet = Sheet(width, row + size[0] + MARGIN, title)
     for column, (name, *_) in enumerate(meshes):
         left, top = MARGIN + column * (panel + GAP), sheet.top
-        mesh, topology = vertices[column], topologies[column]
+        mesh = MeshView(vertices[column], topologies[column], camera, size)
         sheet.caption(f"{literal(name)}     $C$ = {float(stars[column].sum()):#.4g}", left, top, panel)
-        daylight, colors = _panels(mesh, topology, camera, scale.colors(values[column]))
+        daylight, colors = _panels(mesh, scale.colors(values[column]))
         sheet.image(daylight, left, top + CAPTION)
         sheet.image(colors, left, top + row)
-    scale.draw_bar(sheet, row + camera.height)
+    scale.draw_bar(sheet, row + size[0])
     return sheet.write(path, overwrite=overwrite)
 
 
-def _panels(vertices: Tensor, topology: Topology, camera: Camera, colors: Tensor) -> tuple[Tensor, Tensor]:
-    mesh = MeshView(vertices, topology, camera)
-    daylight = mesh.paint(shade_faces(vertices, topology, camera), edges=quiet_edges(mesh))
-    if not topology.num_faces:
+def _panels(mesh: MeshView, colors: Tensor) -> tuple[Tensor, Tensor]:
+    daylight = mesh.paint(shade_faces(mesh.vertices, mesh.topology, mesh.camera), edges=quiet_edges(mesh))
+    if not mesh.topology.num_faces:
         return daylight, daylight
-    shades = 0.9 + 0.1 * shade_faces(vertices, topology, camera, vertices.new_ones(3)).mean(1)
+    shades = 0.9 + 0.1 * shade_faces(mesh.vertices, mesh.topology, mesh.camera, mesh.vertices.new_ones(3)).mean(1)
     return daylight, mesh.paint_vertices(colors, face_shades=shades)

@@ -11,7 +11,7 @@ from torch import Tensor
 from ..energies import angle_variation_per_edge
 from ..errors import ShapeError
 from ..topology import Topology
-from .camera import Camera, fit_camera
+from .camera import fit_camera
 from .captions import energy_caption
 from .color_scale import BAR, ColorScale
 from .lines import EdgeStyle
@@ -66,27 +66,28 @@ def picture_edges(
     columns = min(columns, len(meshes))
     panel = (width - 2 * MARGIN - BAR - (columns - 1) * GAP) // columns
     towards_eye, up = view or view_direction(vertices[0], topologies[0])
-    camera = fit_camera(*vertices, towards_eye=towards_eye, up=up, width=panel)
+    camera, size = fit_camera(*vertices, towards_eye=towards_eye, up=up, width=panel)
 
-    row = CAPTION + camera.height
+    row = CAPTION + size[0]
     rows = -(-len(meshes) // columns)
     sheet = Sheet(width, rows * row + MARGIN, title)
     for number, (name, mesh) in enumerate(zip(meshes, vertices, strict=True)):
         left = MARGIN + (number % columns) * (panel + GAP)
         top = sheet.top + (number // columns) * row
         sheet.caption(energy_caption(name, mesh, topologies[number]), left, top, panel)
-        sheet.image(_panel(mesh, topologies[number], camera, values[number], scale), left, top + CAPTION)
+        shown = MeshView(mesh, topologies[number], camera, size)
+        sheet.image(_panel(shown, values[number], scale), left, top + CAPTION)
     scale.draw_bar(sheet, rows * row)
     return sheet.write(path, overwrite=overwrite)
 
 
-def _panel(vertices: Tensor, topology: Topology, camera: Camera, values: Tensor, scale: ColorScale) -> Tensor:
+def _panel(mesh: MeshView, values: Tensor, scale: ColorScale) -> Tensor:
     """One mesh, its interior edges coloured by ``values``, the worst on top."""
-    mesh = MeshView(vertices, topology, camera)
+    topology = mesh.topology
     interior, boundary = topology.num_interior_edges, topology.num_edges - topology.num_interior_edges
     colors = torch.cat([scale.colors(values), torch.full((boundary, 3), 0.6)])
     widths = torch.full((topology.num_edges,), line_width(mesh, 0.16, 1.0, 3.2))
     widths[interior:] = 1.0
     order = torch.cat([values.cpu(), torch.full((boundary,), -1.0, dtype=values.dtype)])
-    pale = 0.75 + 0.25 * shade_faces(vertices, topology, camera, vertices.new_ones(3))
+    pale = 0.75 + 0.25 * shade_faces(mesh.vertices, topology, mesh.camera, mesh.vertices.new_ones(3))
     return mesh.paint(pale, edges=EdgeStyle(colors, widths, order))

@@ -55,13 +55,13 @@ def picture_mesh(
     """
     vertices = one_mesh(vertices, topology)
     towards_eye, up = view or view_direction(vertices, topology)
-    camera = fit_camera(vertices, towards_eye=towards_eye, up=up, width=width, height=height)
-    mesh = MeshView(vertices, topology, camera)
+    camera, size = fit_camera(vertices, towards_eye=towards_eye, up=up, width=width, height=height)
+    mesh = MeshView(vertices, topology, camera, size)
     if vertex_colors is not None:
         picture = mesh.paint_vertices(vertex_colors)
     else:
         colors = shade_faces(vertices, topology, camera, face_colors)
         picture = mesh.paint(colors, edges=edges or quiet_edges(mesh))
-    sheet = Sheet(width, camera.height, title)
+    sheet = Sheet(width, size[0], title)
     sheet.image(picture, 0, sheet.top)
     return sheet.write(path, overwrite=overwrite)

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from ..principal import PrincipalEdges
-from .camera import Camera, fit_camera
+from .camera import fit_camera
 from .lines import EdgeStyle
 from .render import MeshView, one_mesh
 from .shading import FRONT, shade_faces
@@ -55,22 +55,22 @@ def picture_principal_edges(
     columns = min(columns, len(shown))
     panel = (width - 2 * MARGIN - (columns - 1) * GAP) // columns
     towards_eye, up = view or view_direction(shown[0][1], shown[0][2].topology)
-    camera = fit_camera(*(vertices for _, vertices, _ in shown), towards_eye=towards_eye, up=up, width=panel)
-    row = CAPTION + camera.height
+    camera, size = fit_camera(*(vertices for _, vertices, _ in shown), towards_eye=towards_eye, up=up, width=panel)
+    row = CAPTION + size[0]
     sheet = Sheet(width, -(-len(shown) // columns) * row + MARGIN, title)
     for number, (name, vertices, edges) in enumerate(shown):
         left = MARGIN + (number % columns) * (panel + GAP)
         top = sheet.top + (number // columns) * row
         sheet.caption(name, left, top, panel)
-        sheet.image(_panel(vertices, edges, camera), left, top + CAPTION)
+        sheet.image(_panel(MeshView(vertices, edges.topology, camera, size), edges), left, top + CAPTION)
     return sheet.write(path, overwrite=overwrite)
 
 
-def _panel(vertices: Tensor, edges: PrincipalEdges, camera: Camera) -> Tensor:
-    mesh = MeshView(vertices, edges.topology, camera)
+def _panel(mesh: MeshView, edges: PrincipalEdges) -> Tensor:
+    vertices = mesh.vertices
     mask = edges.mask.to(vertices.device)
     colors = torch.where(mask[:, None], vertices.new_tensor(_PRINCIPAL), vertices.new_tensor(_OTHER))
     thin = line_width(mesh, 0.04, 0.35, 1.0)
     widths = torch.where(mask, 2.6 * thin, thin)
-    faces = shade_faces(vertices, edges.topology, camera, vertices.new_tensor(FRONT))
+    faces = shade_faces(vertices, mesh.topology, mesh.camera, vertices.new_tensor(FRONT))
     return mesh.paint(faces, edges=EdgeStyle(colors, widths, mask.to(vertices.dtype)))

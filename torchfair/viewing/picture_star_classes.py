@@ -7,12 +7,14 @@ import os
 import torch
 from torch import Tensor
 
+from ..cameras import Camera, Size
+from ..geometry import face_centres
 from ..stars import StarClasses, StarKind
 from ..topology import Topology
-from .camera import Camera, fit_camera
+from .camera import fit_camera
 from .lines import EdgeStyle
 from .render import MeshView, one_mesh
-from .shading import face_centres, shade_faces
+from .shading import shade_faces
 from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction
 from .wireframe import line_width
@@ -66,8 +68,8 @@ def picture_star_classes(
     vertices = one_mesh(vertices, topology)
     panel = (width - 2 * MARGIN - GAP) // 2
     towards_eye, up = view or view_direction(vertices, topology)
-    camera = fit_camera(vertices, towards_eye=towards_eye, up=up, width=panel)
-    sheet = Sheet(width, 2 * CAPTION + camera.height + MARGIN, title)
+    camera, size = fit_camera(vertices, towards_eye=towards_eye, up=up, width=panel)
+    sheet = Sheet(width, 2 * CAPTION + size[0] + MARGIN, title)
     codes = _class_codes(classes)
     boundary = codes == 4
     panels = (
@@ -78,8 +80,8 @@ def picture_star_classes(
         left = MARGIN + column * (panel + GAP)
         sheet.caption(name, left, sheet.top, panel)
         colors = torch.tensor([*palette.values(), _COLORS["boundary"]])
-        sheet.image(_panel(vertices, topology, camera, values, colors), left, sheet.top + CAPTION)
-        _legend(sheet, values, palette, left, sheet.top + CAPTION + camera.height, panel)
+        sheet.image(_panel(vertices, topology, camera, size, values, colors), left, sheet.top + CAPTION)
+        _legend(sheet, values, palette, left, sheet.top + CAPTION + size[0], panel)
     return sheet.write(path, overwrite=overwrite)
 
 
@@ -93,7 +95,7 @@ def _class_codes(classes: StarClasses) -> Tensor:
     return codes.cpu()
 
 
-def _panel(vertices: Tensor, topology: Topology, camera: Camera, values: Tensor, colors: Tensor) -> Tensor:
+def _panel(vertices: Tensor, topology: Topology, camera: Camera, size: Size, values: Tensor, colors: Tensor) -> Tensor:
     """The mesh with the cell of each vertex in the colour of its value."""
     vertices, topology = vertices.cpu(), topology.to("cpu")
     corners = values[topology.corners]
@@ -103,10 +105,10 @@ def _panel(vertices: Tensor, topology: Topology, camera: Camera, values: Tensor,
         rank = torch.where(corners == last, -1, corners)
         worst = (worst - 1).scatter_reduce(0, topology.corner_faces, rank, "amax")
         paint = colors[worst.where(worst >= 0, torch.tensor(last))].to(vertices)
-        mesh = MeshView(vertices, topology, camera)
+        mesh = MeshView(vertices, topology, camera, size)
         return mesh.paint(shade_faces(vertices, topology, camera, paint))
     points, cells = _cells(vertices, topology)
-    mesh = MeshView(points, cells, camera)
+    mesh = MeshView(points, cells, camera, size)
     ends = cells.edges
     drawn = (ends < topology.num_vertices).any(1)  # halves of edges, not the lines to the middles of faces
     widths = torch.where(drawn, line_width(mesh, 0.1, 0.4, 1.2), 0.0)

@@ -9,11 +9,13 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
+from ..cameras import Camera
+from ..cameras.camera import Size, height_and_width
 from ..errors import ShapeError
 from ..rasterisation.rasterise import interpolate, visible_triangles
 from ..topology import Topology
 from ..triangulation import Triangulation, triangulate
-from .camera import Camera
+from .camera import check_one_view
 from .lines import EdgeStyle, Surface, visible_lines
 
 Color = tuple[float, float, float]
@@ -28,16 +30,30 @@ class MeshView:
     Args:
         vertices: ``(V, 3)``.
         topology: connectivity, any polygons.
-        camera: the view, in pixels of the final picture.
+        camera: the view, such as from :func:`~torchfair.viewing.fit_camera`.
+        size: pixels of the final picture, (height, width) or one number for a square.
         supersampling: samples per pixel along each side; 1 for none.
+
+    Raises:
+        ShapeError: if ``vertices`` are not one mesh that fits the topology, the camera has several views, or the
+            picture no pixels.
+        TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
     """
 
-    def __init__(self, vertices: Tensor, topology: Topology, camera: Camera, *, supersampling: int = 3) -> None:
+    def __init__(
+        self, vertices: Tensor, topology: Topology, camera: Camera, size: Size, *, supersampling: int = 3
+    ) -> None:
+        check_one_view(camera)
         self.vertices = one_mesh(vertices, topology)
         self.topology = topology
         self.camera = camera
+        self.height, self.width = height_and_width(size)
         self.supersampling = supersampling
-        self._fine = camera.enlarged(supersampling)
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        """Rows and columns of samples."""
+        return self.height * self.supersampling, self.width * self.supersampling
 
     @cached_property
     def triangulation(self) -> Triangulation:
@@ -47,12 +63,13 @@ class MeshView:
     @cached_property
     def points(self) -> Tensor:
         """``(V, 3)`` positions on the screen in samples, and depth."""
-        return self._fine.project(self.vertices)
+        return self.camera.project(self.vertices, self.samples)[0]
 
     @cached_property
     def triangle_index(self) -> Tensor:
         """Triangle of :attr:`triangulation` at each sample, -1 where there is none."""
-        return visible_triangles(self.points, self.triangulation.triangles, self._fine.width, self._fine.height)
+        rows, columns = self.samples
+        return visible_triangles(self.points, self.triangulation.triangles, columns, rows)
 
     @cached_property
     def face_index(self) -> Tensor:
@@ -112,10 +129,10 @@ class MeshView:
         """Barycentric weights on the surface in space (on the screen they are distorted by perspective)."""
         triangles = self.triangulation.triangles
         weights, _ = interpolate(self.points, triangles, self.triangle_index)
-        if not self.camera.perspective:
+        if not self.camera.central:
             return weights
         corners = torch.nn.functional.pad(triangles, (0, 0, 0, 1))[self.triangle_index]
-        weights = weights * -self.points[:, 2][corners]  # depth is -1 / distance
+        weights = self.camera.weights_in_space(weights, self.points[:, 2][corners])
         total = weights.sum(-1, keepdim=True)
         return weights / torch.where(total > 0, total, 1)
 
@@ -133,13 +150,14 @@ class MeshView:
 
     def _bands(self) -> Iterator[slice]:
         """The rows of samples, a whole number of pixel rows at a time."""
-        rows = max(1, _BAND // (self._fine.width * self.supersampling)) * self.supersampling
-        return (slice(top, top + rows) for top in range(0, self._fine.height, rows))
+        height, width = self.samples
+        rows = max(1, _BAND // (width * self.supersampling)) * self.supersampling
+        return (slice(top, top + rows) for top in range(0, height, rows))
 
     def _average(self, samples: Tensor) -> Tensor:
         """Mean colour of the samples of each pixel of some rows."""
         factor = self.supersampling
-        cells = samples.view(-1, factor, self.camera.width, factor, 3)
+        cells = samples.view(-1, factor, self.width, factor, 3)
         parts = (cells[:, row, :, column] for row in range(factor) for column in range(factor))
         return functools.reduce(torch.add, parts) / factor**2
 

@@ -1,15 +1,14 @@
-"""Light on flat faces: colours from normals, soft studio light or stripes seen in a mirror."""
+"""Light on flat faces: colours from normals, soft studio light, and colours of stripes seen in a mirror."""
 
 from __future__ import annotations
-
-import math
 
 import torch
 from torch import Tensor
 
-from ..geometry import face_area_vectors, face_normals
+from ..cameras import Camera
+from ..geometry import face_area_vectors, face_centres, face_normals
 from ..topology import Topology
-from .camera import Camera
+from .camera import towards_eye
 
 Color = tuple[float, float, float]
 
@@ -17,12 +16,6 @@ FRONT: Color = (0.80, 0.83, 0.87)
 BACK: Color = (0.86, 0.78, 0.66)
 STRIPES_DARK: Color = (0.07, 0.10, 0.17)
 STRIPES_LIGHT: Color = (0.97, 0.97, 0.95)
-
-
-def face_centres(vertices: Tensor, topology: Topology) -> Tensor:
-    """Means of the corners of each face, ``(F, 3)``."""
-    sums = vertices.new_zeros(topology.num_faces, 3).index_add_(0, topology.corner_faces, vertices[topology.corners])
-    return sums / topology.face_sizes[:, None]
 
 
 def towards_viewer(vertices: Tensor, topology: Topology, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:
@@ -34,7 +27,7 @@ def towards_viewer(vertices: Tensor, topology: Topology, camera: Camera) -> tupl
         counted): so a roof looks the same from above whichever way its faces are oriented.
     """
     area_vectors = face_area_vectors(vertices, topology)
-    to_eye = camera.towards_eye(face_centres(vertices, topology))
+    to_eye = towards_eye(camera, face_centres(vertices, topology))
     facing = (area_vectors * to_eye).sum(-1)
     front = facing >= 0
     normals = face_normals(vertices, topology)
@@ -56,14 +49,15 @@ def shade_faces(
     Args:
         vertices: ``(V, 3)``.
         topology: connectivity.
-        camera: the view.
+        camera: the view, one.
         face_colors: ``(F, 3)`` or ``(3,)`` colours in white light; by default cool grey on the main
             side and sand on the other.
     """
     normals, to_eye, main_side = towards_viewer(vertices, topology, camera)
     if face_colors is None:
         face_colors = torch.where(main_side[:, None], normals.new_tensor(FRONT), normals.new_tensor(BACK))
-    axes = camera.axes.to(normals)
+    right, up, forward = camera.axes[0].to(normals)
+    axes = torch.stack([right, up, -forward])
     key = 0.5 + 0.5 * (normals @ _direction(axes, (-0.75, 0.45, 0.35)))
     fill = 0.5 + 0.5 * (normals @ _direction(axes, (0.85, 0.15, 0.35)))
     diffuse = 0.30 + 0.62 * key**2 + 0.12 * fill
@@ -72,31 +66,8 @@ def shade_faces(
     return (face_colors * diffuse[:, None] + 0.20 * sky[:, None]).clamp(0, 1)
 
 
-def mirror_directions(vertices: Tensor, topology: Topology, camera: Camera) -> Tensor:
-    """Where each face, as a plane mirror, reflects the line of sight: ``r = d - 2 (d.n) n``, ``(F, 3)``.
-
-    ``d`` runs from the eye to the centre of the face. The sign of the normal does not matter. A degenerate face
-    (zero normal) reflects nothing: ``r = d``.
-    """
-    normals = face_normals(vertices, topology)
-    sight = -camera.towards_eye(face_centres(vertices, topology))
-    return sight - 2 * (sight * normals).sum(-1, keepdim=True) * normals
-
-
-def stripe_values(components: Tensor, frequency: float) -> Tensor:
-    """Brightness 0..1 of striped surroundings in directions r with components ``w.r`` along the unit vector w.
-
-    ``s = 1/2 + 1/2 tanh(6 sin(2 pi f w.r))``: soft-edged stripes perpendicular to ``w``.
-
-    Args:
-        components: ``w.r``, any shape.
-        frequency: f, number of stripe pairs per unit of ``w.r``.
-    """
-    return 0.5 + 0.5 * torch.tanh(6 * torch.sin(2 * math.pi * frequency * components))
-
-
 def stripe_frequency(components: Tensor, topology: Topology, *, stripes: float = 7.0) -> float:
-    """A frequency for :func:`stripe_values` at which the stripes can be followed across the mesh.
+    """A frequency for :class:`~torchfair.reflection.Stripes` at which they can be followed across the mesh.
 
     About ``stripes`` pairs over the middle 90 % of the surface, but so few that nine of ten interior edges
     separate faces less than 28 % of a period apart, and at least one.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from .camera import look_axes
+from .camera import eye_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +48,7 @@ def fit_sphere_view(*points: Tensor, towards_eye: Tensor, up: Tensor) -> SphereV
 
     Points that are not unit vectors (zero normals of degenerate faces) are ignored.
     """
-    axes = look_axes(towards_eye, up)
+    axes = eye_axes(towards_eye, up)
     seen = torch.cat([on_sphere(p.detach().to("cpu", torch.float64)) for p in points]) @ axes.T
     if seen.shape[0] == 0 or bool((seen[:, 2] < 0).any()):
         return SphereView(axes, (0.0, 0.0), 1.04)

@@ -9,8 +9,9 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from ..cameras import OrthographicCamera
 from ..io.atomic import atomic_write_bytes
-from ..reflection import OrthographicCamera, Stripes, render_reflection, ring_directions
+from ..reflection import Stripes, render_reflection, ring_directions
 from ..reflection.smooth_reference import SmoothReference
 from ..topology import Topology
 from .picture_reflections import mirror_colors

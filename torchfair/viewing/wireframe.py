@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import torch
 
-from ..geometry import face_area_vectors
+from ..geometry import face_area_vectors, face_centres
+from .camera import towards_eye
 from .lines import EdgeStyle
 from .render import MeshView
-from .shading import face_centres
 
 _INK = (0.10, 0.13, 0.19)
 
@@ -27,7 +27,7 @@ def outline(view: MeshView) -> EdgeStyle:
     """The boundary, and the edges where the surface turns away from the eye."""
     topology = view.topology
     widths = torch.zeros(topology.num_edges, dtype=torch.float64, device=view.points.device)
-    to_eye = view.camera.towards_eye(face_centres(view.vertices, topology))
+    to_eye = towards_eye(view.camera, face_centres(view.vertices, topology))
     front = (face_area_vectors(view.vertices, topology) * to_eye).sum(-1) >= 0
     left, right = topology.interior_edge_faces.unbind(1)
     widths[: topology.num_interior_edges] = 1.4 * (front[left] != front[right])

@@ -8,11 +8,10 @@ import torch
 from torch import Tensor
 
 from ..errors import TorchfairError
-from ..rasterisation.camera_fit import check_frame, fit_eyes, look_axes, points_to_fit
-from .camera import Camera, Size, camera_rows, fill_attributes, height_and_width, positive_numbers, unit_directions
+from .attributes import camera_rows, fill_attributes, positive_numbers, unit_directions
+from .camera import Camera
+from .fitting import check_frame, fit_eyes, look_axes, points_to_fit
 from .orthographic_camera import OrthographicCamera
-
-_NEAR = 1e-4  # part of the distance of the target
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,40 +86,15 @@ class PerspectiveCamera(Camera):
         return self.eyes
 
     @property
-    def near(self) -> Tensor:
-        """``(views,)``: what is nearer along the line of sight than 1e-4 of the distance of the target is cut away."""
-        near: Tensor = _NEAR * torch.linalg.vector_norm(self.targets - self.eyes, dim=-1)
-        return near
+    def distances(self) -> Tensor:
+        """``(views,)`` from the eyes to the targets."""
+        distances: Tensor = torch.linalg.vector_norm(self.targets - self.eyes, dim=-1)
+        return distances
 
-    def to_screen(self, local: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
-        """Pixel coordinates x, y and ``-1 / distance``, from what :meth:`local` gives; NaN at and behind the eye."""
-        height, width = height_and_width(size)
-        right, up, forward = local.unbind(-1)
-        inverse = 1 / torch.where(forward > 0, forward, torch.nan)
-        scale = self._pixels_per_slope(width).to(local)
-        scale = (scale[:, None] if view is None else scale[view]) * inverse
-        return torch.stack([width / 2 + scale * right, height / 2 - scale * up, -inverse], dim=-1)
-
-    def directions_at(self, pixels: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
-        """Unit directions of the rays through places ``(views, *any, 2)`` of the picture: ``(views, *any, 3)``."""
-        height, width = height_and_width(size)
-        axes, scale = self.axes.to(pixels), self._pixels_per_slope(width).to(pixels)[:, None]
-        if view is None:
-            spread = (1,) * (pixels.ndim - 2)
-            axes, scale = axes.view(-1, *spread, 3, 3), scale.view(-1, *spread, 1)
-        else:
-            axes, scale = axes[view], scale[view]
-        slopes = (pixels - pixels.new_tensor([width / 2, height / 2])) * pixels.new_tensor([1.0, -1.0]) / scale
-        right, up, forward = axes.unbind(-2)
-        towards: Tensor = slopes[..., :1] * right + slopes[..., 1:] * up + forward
-        return torch.nn.functional.normalize(towards, dim=-1)
-
-    def view_directions(self, points: Tensor) -> Tensor:
-        """Unit directions from each eye to points ``(*batch, N, 3)``: (*batch, views, N, 3), zero at the eye."""
-        return torch.nn.functional.normalize(points.unsqueeze(-3) - self.eyes.to(points)[:, None], dim=-1)
-
-    def _origins_at(self, pixels: Tensor, size: Size) -> Tensor:
-        return self.eyes.view(-1, *[1] * (pixels.ndim - 2), 3).expand(*pixels.shape[:-1], 3)
-
-    def _pixels_per_slope(self, width: int) -> Tensor:
+    def scales(self, width: int) -> Tensor:
+        """``(views,)`` pixels per unit of length at distance 1, in a picture ``width`` pixels wide."""
         return width / (2 * torch.tan(torch.deg2rad(self.fields_of_view) / 2))
+
+    @property
+    def _local_to_world(self) -> Tensor:
+        return self.axes  # which are perpendicular, so nothing is lost in an inverse

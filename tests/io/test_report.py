@@ -12,8 +12,7 @@ import torch
 
 import torchfair
 from torchfair import MeshFileError
-from torchfair.cli.plain import plain, to_json
-from torchfair.cli.report import versions, write_report
+from torchfair.io import plain, to_json, versions, write_report
 
 
 class Colour(enum.Enum):

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import pytest
 from rich.console import Console
 
-from torchfair.cli import progress
-from torchfair.cli.progress import ProgressDisplay
-from torchfair.cli.time_left import TimeLeft, duration
+from torchfair.progress import ProgressDisplay, TimeLeft, duration
+from torchfair.progress import display as progress
 
 
 @dataclass

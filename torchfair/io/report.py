@@ -7,7 +7,8 @@ import platform
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .plain import to_json
+from .atomic import atomic_write_text
+from .json_text import to_json
 
 
 def write_report(
@@ -42,8 +43,6 @@ def write_report(
         ValueError: if ``extra`` repeats an entry.
         MeshFileError: if the file cannot be written.
     """
-    from ..io import atomic_write_text
-
     entries = {
         "energies": {"before": energies_before, "after": energies_after},
         "residuals": [_row(row) for row in residuals],

@@ -11,7 +11,8 @@ from reflection_tools import EACH_KIND, vector
 from torch import Tensor
 
 from torchfair import ShapeError, TorchfairError
-from torchfair.reflection import Camera, OrthographicCamera, PerspectiveCamera, cone_directions
+from torchfair.cameras import Camera, OrthographicCamera, PerspectiveCamera
+from torchfair.reflection import cone_directions
 
 each_kind = pytest.mark.parametrize("kind", EACH_KIND.values(), ids=EACH_KIND)
 DIRECTIONS = cone_directions(vector(0.4, -0.3, -1), 170, 5)

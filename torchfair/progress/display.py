@@ -54,7 +54,7 @@ class ProgressDisplay:
 
     On a terminal one line is redrawn in place, at most ten times a second. Otherwise plain lines are printed and
     flushed: the first record, every ``every``-th, and the last. The time left is that of
-    :class:`~torchfair.cli.time_left.TimeLeft`, an upper estimate. Never asks the solver to stop.
+    :class:`~torchfair.progress.TimeLeft`, an upper estimate. Never asks the solver to stop.
 
     Example::
 

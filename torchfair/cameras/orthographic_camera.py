@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from ..rasterisation.camera_fit import check_frame, fit_windows, look_axes, points_to_fit
-from .camera import Camera, Size, camera_rows, fill_attributes, height_and_width, positive_numbers, unit_directions
+from .attributes import camera_rows, fill_attributes, positive_numbers, unit_directions
+from .camera import Camera
+from .fitting import check_frame, fit_windows, look_axes, points_to_fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,34 +92,13 @@ class OrthographicCamera(Camera):
         return self.targets
 
     @property
-    def near(self) -> None:
-        """None: a parallel view has no eye for things to be behind."""
+    def distances(self) -> None:
+        """None: a parallel view has no eye."""
 
-    def to_screen(self, local: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
-        """Pixel coordinates x, y and distance along the line of sight, from what :meth:`local` gives."""
-        height, width = height_and_width(size)
-        right, up, forward = local.unbind(-1)
-        scale = (width / (2 * self.half_widths)).to(local)
-        scale = scale[:, None] if view is None else scale[view]
-        return torch.stack([width / 2 + scale * right, height / 2 - scale * up, forward], dim=-1)
+    def scales(self, width: int) -> Tensor:
+        """``(views,)`` pixels per unit of length in a picture ``width`` pixels wide."""
+        return width / (2 * self.half_widths)
 
-    def directions_at(self, pixels: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
-        """The direction of each view, repeated for every place ``(views, *any, 2)``: ``(views, *any, 3)``."""
-        directions = self.directions.to(pixels)
-        if view is not None:
-            return directions[view]
-        return directions.view(-1, *[1] * (pixels.ndim - 2), 3).expand(*pixels.shape[:-1], 3)
-
-    def view_directions(self, points: Tensor) -> Tensor:
-        """The direction of each view, repeated for points ``(*batch, N, 3)``: (*batch, views, N, 3)."""
-        shape = (*points.shape[:-2], self.num_views, points.shape[-2], 3)
-        return self.directions.to(points)[:, None].expand(shape)
-
-    def _origins_at(self, pixels: Tensor, size: Size) -> Tensor:
-        height, width = height_and_width(size)
-        across = (pixels - pixels.new_tensor([width / 2, height / 2])) * pixels.new_tensor([1.0, -1.0])
-        spread = (1,) * (pixels.ndim - 2)
-        scale = (2 * self.half_widths / width).view(-1, *spread, 1)
-        right, up, _ = (axis.view(-1, *spread, 3) for axis in self.axes.unbind(1))
-        across = across * scale
-        return self.targets.view(-1, *spread, 3) + across[..., :1] * right + across[..., 1:] * up
+    @property
+    def _local_to_world(self) -> Tensor:
+        return self.axes  # which are perpendicular, so nothing is lost in an inverse

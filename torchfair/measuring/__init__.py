@@ -1,0 +1,9 @@
+"""All numbers of a mesh at once, as ``torchfair measure`` and ``torchfair diagnose`` print them."""
+
+from .diagnosis import Diagnosis as Diagnosis
+from .diagnosis import diagnose_mesh as diagnose_mesh
+from .measurements import EdgeMeasures as EdgeMeasures
+from .measurements import Quantity as Quantity
+from .measurements import count_components as count_components
+from .measurements import measure_mesh as measure_mesh
+from .measurements import worst_edges as worst_edges
