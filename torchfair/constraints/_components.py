@@ -21,6 +21,13 @@ def dot(a: Tensor, b: Tensor) -> Tensor:
     return (a * b).sum(0)
 
 
+def lengths(vectors: Tensor) -> Tensor:
+    """Lengths along the first dimension, zero with derivative zero where vectors are; faster than ``vector_norm``."""
+    squared = dot(vectors, vectors)
+    positive = ~(squared <= 0.0)
+    return torch.where(positive, torch.where(positive, squared, 1.0).sqrt(), 0.0)
+
+
 def cross(a: Tensor, b: Tensor) -> Tensor:
     """Cross products along the first dimension, faster there than ``torch.linalg.cross``."""
     a, b = torch.cat([a, a[:2]]), torch.cat([b, b[:2]])

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from ..projection import ElementTerm
 from ..topology import Topology
-from ._components import area_derivatives, area_vectors, components_first, cross, derivative_rows, dot
+from ._components import area_derivatives, area_vectors, components_first, cross, derivative_rows, dot, lengths
 from .barrier import barrier, barrier_slope
 
 _TINY = 1e-30  # of the squared lengths of vectors: for those that are zero
@@ -28,12 +28,12 @@ def corner_angle_terms(
 
     def angle(x: Tensor, silent: Tensor) -> Tensor:
         ahead, back = _legs(x)
-        return barrier(_angles(ahead, back, _lengths(cross(ahead, back))) - smallest, silent - smallest)
+        return barrier(_angles(ahead, back, lengths(cross(ahead, back))) - smallest, silent - smallest)
 
     def slope(x: Tensor, silent: Tensor) -> Tensor:
         ahead, back = _legs(x)
         normal = cross(ahead, back)
-        length = _lengths(normal)
+        length = lengths(normal)
         normal = normal / torch.where(length > 0.0, length, 1.0)  # a closed corner opens to no side more than another
         steepness = barrier_slope(_angles(ahead, back, length) - smallest, silent - smallest)
         at_ahead = steepness / dot(ahead, ahead) * cross(ahead, normal)
@@ -48,12 +48,6 @@ def _legs(x: Tensor) -> tuple[Tensor, Tensor]:
     """(3, n) edges ahead and back from the corners ``x[:, 1]``."""
     corners = components_first(x)
     return corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 1]
-
-
-def _lengths(vectors: Tensor) -> Tensor:
-    """Lengths (n,) of vectors (3, n), differentiable where they are zero."""
-    lengths: Tensor = torch.linalg.vector_norm(vectors, dim=0)
-    return lengths
 
 
 def _angles(ahead: Tensor, back: Tensor, sines: Tensor) -> Tensor:
@@ -81,13 +75,13 @@ def face_area_terms(
     """Barrier that keeps every face above the fraction ``smallest`` of its own area in ``areas`` (F,)."""
 
     def share(x: Tensor, area: Tensor) -> Tensor:
-        margin = _lengths(area_vectors(components_first(x))) / area - smallest
+        margin = lengths(area_vectors(components_first(x))) / area - smallest
         return barrier(margin, torch.full_like(margin, safe - smallest))
 
     def slope(x: Tensor, area: Tensor) -> Tensor:
         corners = components_first(x)
         vectors = area_vectors(corners)
-        sizes = _lengths(vectors)
+        sizes = lengths(vectors)
         margin = sizes / area - smallest
         steepness = barrier_slope(margin, torch.full_like(margin, safe - smallest)) / area
         return derivative_rows(area_derivatives(corners, steepness / sizes.clamp_min(_TINY) * vectors).unbind(1))
