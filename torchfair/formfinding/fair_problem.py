@@ -233,11 +233,12 @@ class FairProblem:
 
         E may rise where handles, another reference or planarity ask for a different shape.
         """
-        kept = self._guard.keeps_faces(state, trial) and self._guard.keeps_bounds(trial)
-        return kept and (self._other_goals or self._guard.keeps_energy(trial))
+        kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
+        return kept and (self._other_goals or self.guard.keeps_energy(trial))
 
     @cached_property
-    def _guard(self) -> FairGuard:
+    def guard(self) -> FairGuard:
+        """What judges the meshes of states."""
         bounded = self.settings.quality_weight > 0.0
         return FairGuard(
             self.vertices,

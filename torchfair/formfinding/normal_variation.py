@@ -10,7 +10,6 @@ import torch
 from torch import Tensor
 
 from .._interrupts import deferred_interrupts
-from ..energies import normal_variation
 from ..normalisation import Normalisation
 from ..projection import Callback, ProjectionResult
 from ..projection.layout import State
@@ -124,8 +123,7 @@ class _Job(NamedTuple):
 
     def observe(self, state: State) -> dict[str, float]:
         """What the history holds."""
-        energy = float(normal_variation(self.problem.placed(state), self.topology))
-        return {"normal_variation": self.normalisation.length * energy}
+        return {"normal_variation": self.normalisation.length * self.problem.guard.energy(state)}
 
     def result(self, vertices: Tensor, runs: list[ProjectionResult]) -> FairResult:
         """The mesh after all runs, in the dtype and on the device of the input ``vertices``, and its measures."""
