@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from torchfair.projection import ProjectionSettings, Status
@@ -32,6 +34,20 @@ def test_as_many_small_falls_as_patience_asks_for_are_rest() -> None:
     assert after_falls(start(), 1e-8, 1e-8, 1e-5, 1e-8, 1e-8).suspicion is None
     assert after_falls(start(), 2e-6, 1e-8, 1e-8).suspicion is None
     assert after_falls(start(), 9e-7, 9e-7, 9e-7).suspicion is Status.MERIT_TOLERANCE  # each of them
+
+
+@pytest.mark.parametrize(("times", "ends"), [(1, 3), (2, 6), (4, 12)])
+def test_small_falls_of_damped_steps_are_waited_for_longer_unless_runs_go_on(times: int, ends: int) -> None:
+    settings = replace(SETTINGS, patience_when_damped=times, when_settled="stop", initial_damping=0.5)
+    course, standing = start(), Standing(1.0 - 1e-9, 0.5, 0.0)
+    for number in range(1, ends + 1):
+        course = course.after(TAKEN, standing, settings, inexact=False)
+        assert (course.suspicion is Status.MERIT_TOLERANCE) == (number == ends)
+    lightly = replace(settings, initial_damping=1.0)  # not above its start
+    course = start()
+    for _ in range(3):
+        course = course.after(TAKEN, standing, lightly, inexact=False)
+    assert course.suspicion is Status.MERIT_TOLERANCE
 
 
 def test_what_was_found_to_be_no_minimum_is_suspected_only_after_new_rest() -> None:

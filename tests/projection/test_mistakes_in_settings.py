@@ -90,6 +90,7 @@ BAD_SETTINGS = [
     ({"max_iterations": -1}, "max_iterations must be a whole number of at least 0"),
     ({"patience": 0}, "patience must be a whole number of at least 1"),
     ({"patience": True}, "patience must be a whole number"),
+    ({"patience_when_damped": 0}, "patience_when_damped must be a whole number of at least 1"),
     ({"initial_damping": 0.0}, "initial_damping must be a finite number above 0"),
     ({"initial_damping": math.inf}, "initial_damping must be a finite number above 0"),
     ({"gradient_tolerance": -1e-9}, "gradient_tolerance must be a number of at least 0"),

@@ -54,7 +54,7 @@ def add_parser(subparsers: Any) -> None:
     add("--formulation", choices=("reduced", "lifted"), default="reduced",
         help="unknowns: vertices only, or the paper's auxiliary variables too (default reduced)")  # fmt: skip
     add("--solver", choices=("auto", "dense", "scipy", "rslab", "cg"), default="auto", help="linear solver")
-    add("--iterations", type=positive_count, default=60, metavar="N", help="at most this many steps (default 60)")
+    add("--iterations", type=positive_count, default=80, metavar="N", help="at most this many steps (default 80)")
     parser.set_defaults(run=run, name=NAME)
 
 

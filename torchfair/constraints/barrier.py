@@ -24,3 +24,11 @@ def barrier(margin: Tensor, safe: Tensor) -> Tensor:
     value = (safe + softening) / (inside + softening) - 1.0
     value = torch.where(margin < safe, value, torch.zeros_like(value))
     return torch.where(margin < 0.0, torch.full_like(value, torch.inf), value)
+
+
+def barrier_slope(margin: Tensor, safe: Tensor) -> Tensor:
+    """Derivative of :func:`barrier` by the margin: at most zero; zero too where the barrier is infinite."""
+    softening = _SOFTENING * safe
+    active = (margin >= 0.0) & (margin < safe)
+    shifted = torch.where(active, margin, torch.zeros_like(margin)) + softening
+    return torch.where(active, -(safe + softening) / (shifted * shifted), torch.zeros_like(margin))

@@ -10,7 +10,7 @@ from torch import Tensor
 from ..geometry.closest_point import ReferenceSurface
 from ..projection import ElementTerm
 from ..projection.layout import State
-from .barrier import barrier
+from .barrier import barrier, barrier_slope
 
 Feet = Callable[[State], tuple[Tensor, Tensor]]  # closest points (V, 3) and unit normals (V, 3)
 
@@ -89,8 +89,12 @@ def distance_limit_terms(planes: Feet, limits: Tensor, *, weight: float, block: 
     def limit(x: Tensor, feet: Tensor, normals: Tensor, most: Tensor) -> Tensor:
         return barrier(most - plane_distances(x, feet, normals).abs(), 0.5 * most)
 
+    def slope(x: Tensor, feet: Tensor, normals: Tensor, most: Tensor) -> Tensor:
+        distances = plane_distances(x, feet, normals)
+        return (-distances.sign() * barrier_slope(most - distances.abs(), 0.5 * most))[:, None] * normals
+
     def refresh(state: State) -> tuple[Tensor, Tensor, Tensor]:
         return (*planes(state), limits)
 
     stencil = [(block, torch.arange(limits.shape[0], device=limits.device)[:, None])]
-    return [ElementTerm("distance limit", limit, stencil, weight=weight, refresh=refresh, batched=True)]
+    return [ElementTerm("distance limit", limit, stencil, weight=weight, refresh=refresh, jacobian=slope, batched=True)]

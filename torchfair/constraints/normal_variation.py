@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import torch
 from torch import Tensor
-from torch.linalg import cross, vector_norm
 
 from ..projection import ElementTerm, SmoothAbsolute
 from ..topology import Topology
+from ._components import components_first, cross, derivative_rows, dot
+from ._polygon_bend import PolygonBend, polygon_bend
 
 NAME = "normal variation"
 
@@ -30,15 +29,16 @@ def normal_variation_terms(
     """
     terms = []
     for (left, _), stencil in edge_stencils(topology).items():
-        is_triangles = stencil.shape[1] == 4
+        bend = TRIANGLE_BEND if stencil.shape[1] == 4 else polygon_bend(left)
         terms.append(
             ElementTerm(
                 NAME,
-                triangle_pair_bend if is_triangles else _polygon_residual(left),
+                bend.residual,
                 [(block, stencil)],
                 weight=weight,
                 loss=SmoothAbsolute(smoothing),
-                jacobian=triangle_pair_bend_gradient if is_triangles else None,
+                jacobian=bend.jacobian,
+                batched=True,
             )
         )
     return terms
@@ -81,24 +81,20 @@ def _walk(topology: Topology, start: Tensor, size: int) -> list[Tensor]:
 
 
 def triangle_pair_bend(x: Tensor) -> Tensor:
-    """Signed ``l l*`` of the edge ``x[0] x[1]`` between triangles with apexes ``x[2]`` (left) and ``x[3]``.
+    """Signed ``l l*`` (n,) of edges ``x[:, 0] x[:, 1]`` between triangles with apexes ``x[:, 2]`` (left), ``x[:, 3]``.
 
-    Positive where convex; ``2 sin(a/2)`` is written as ``sin a sqrt(2 / (1 + cos a))``, smooth at a = 0.
+    Positive where convex; ``2 sin(a/2)`` is written as ``sin a sqrt(2 / (1 + cos a))``, smooth at a = 0. One edge
+    (4, 3) gives a scalar.
     """
-    edge, left_side, right_side = x[1] - x[0], x[2] - x[0], x[3] - x[0]
+    edge, left_side, right_side = _sides(x)
     left, right = cross(edge, left_side), cross(right_side, edge)
-    size = vector_norm(left) * vector_norm(right)
+    size = (dot(left, left) * dot(right, right)).sqrt()
     # (left x right) . edge = -|edge|^2 (left . right_side), so that sin a = -|edge| (left . right_side) / size.
-    bend: Tensor = (
-        -torch.dot(edge, edge)
-        * torch.dot(left, right_side)
-        * torch.sqrt(2.0 / (size * (size + torch.dot(left, right))))
-    )
-    return bend
+    return -dot(edge, edge) * dot(left, right_side) * torch.sqrt(2.0 / (size * (size + dot(left, right))))
 
 
 def triangle_pair_bend_gradient(x: Tensor) -> Tensor:
-    """Gradient ``(12,)`` of :func:`triangle_pair_bend` in closed form: ``l* dl + l cos(a/2) da``.
+    """Gradients ``(n, 12)`` of :func:`triangle_pair_bend` in closed form: ``l* dl + l cos(a/2) da``.
 
     With N the normal of a triangle, twice its area long, the dihedral angle turns with the apex of that
     triangle as ``da = -l N / |N|^2``, and with the ends of the edge by the shares at which the foot of the
@@ -109,49 +105,31 @@ def triangle_pair_bend_gradient(x: Tensor) -> Tensor:
            /  |   .
           0---+-----1        share of end 1: |0 +| / |0 1|
     """
-    edge, left_side, right_side = x[1] - x[0], x[2] - x[0], x[3] - x[0]
+    edge, left_side, right_side = _sides(x)
     left, right = cross(edge, left_side), cross(right_side, edge)
-    squared = torch.dot(edge, edge)
-    left_squared, right_squared = torch.dot(left, left), torch.dot(right, right)
+    squared = dot(edge, edge)
+    left_squared, right_squared = dot(left, left), dot(right, right)
     size = torch.sqrt(left_squared * right_squared)
-    cosine_sum = size + torch.dot(left, right)
+    cosine_sum = size + dot(left, right)
     turn = -squared * torch.sqrt(cosine_sum / (2.0 * size))
     at_left, at_right = turn / left_squared * left, turn / right_squared * right
-    stretch = -torch.dot(left, right_side) * torch.sqrt(2.0 / (size * cosine_sum)) * edge
-    left_share, right_share = torch.dot(left_side, edge) / squared, torch.dot(right_side, edge) / squared
+    stretch = -dot(left, right_side) * torch.sqrt(2.0 / (size * cosine_sum)) * edge
+    left_share, right_share = dot(left_side, edge) / squared, dot(right_side, edge) / squared
     at_end = stretch - left_share * at_left - right_share * at_right
-    return torch.cat([-(at_end + at_left + at_right), at_end, at_left, at_right])
+    return derivative_rows([-(at_end + at_left + at_right), at_end, at_left, at_right])
 
 
-def _polygon_residual(size: int) -> Callable[[Tensor], Tensor]:
-    def bend(x: Tensor) -> Tensor:
-        return polygon_pair_bend(x, size)
+def _sides(x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """(3, n) from the start of an edge: to its end, to the apex on its left, to that on its right."""
+    corners = components_first(x)
+    return corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 0]
 
-    return bend
 
-
-def polygon_pair_bend(x: Tensor, left_size: int) -> Tensor:
-    """Bending and twist of an edge between two polygons: a 2-vector of norm ``l l*``.
-
-    ``n - n'`` is orthogonal to ``n + n'``, so two components describe it: one across the edge, signed,
-    positive where convex, and one along it, which vanishes for planar faces. Both are smooth at zero.
-    """
-    left = area_vector(x[:left_size])
-    right = area_vector(torch.cat([x[1:2], x[0:1], x[left_size:]]))
-    left, right = left / vector_norm(left), right / vector_norm(right)
-    edge = x[1] - x[0]
-    length = vector_norm(edge)
-    mean = left + right
-    mean = mean / vector_norm(mean)
-    along = edge - torch.dot(edge, mean) * mean
-    along = along / vector_norm(along)
-    across = cross(along, mean)
-    jump = length * (right - left)
-    return torch.stack([torch.dot(jump, across), torch.dot(jump, along)])
+TRIANGLE_BEND = PolygonBend(triangle_pair_bend, triangle_pair_bend_gradient)
 
 
 def area_vector(polygon: Tensor) -> Tensor:
     """Area vector ``(3,)`` of a polygon ``(k, 3)``, counterclockwise."""
     spokes = polygon[1:] - polygon[0]
-    vector: Tensor = 0.5 * cross(spokes[:-1], spokes[1:]).sum(0)
+    vector: Tensor = 0.5 * torch.linalg.cross(spokes[:-1], spokes[1:]).sum(0)
     return vector

@@ -4,20 +4,41 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor
-from torch.linalg import cross, vector_norm
 
 from ..projection import ElementTerm
 from ..topology import Topology
+from ._components import components_first, cross, derivative_rows, dot
 
 
 def diagonal_distance(x: Tensor) -> Tensor:
-    """Signed distance between the lines of the two diagonals of a quad ``x`` (4, 3); zero when planar.
+    """Signed distances (n,) between the lines of the two diagonals of quads ``x`` (n, 4, 3); zero when planar.
 
-    Infinite for parallel diagonals, which no convex quad has.
+    Infinite for parallel diagonals, which no convex quad has. One quad (4, 3) gives a scalar.
     """
-    normal = cross(x[2] - x[0], x[3] - x[1])
-    distance: Tensor = torch.dot(normal, x[1] - x[0]) / vector_norm(normal)
-    return distance
+    start, end, first, second = _diagonals(x)
+    normal = cross(first, second)
+    return dot(normal, end - start) / dot(normal, normal).sqrt()
+
+
+def diagonal_distance_gradient(x: Tensor) -> Tensor:
+    """Gradients (n, 12) of :func:`diagonal_distance`.
+
+    With N = p x q of the diagonals p and q and w from one to the other, ``D = N . w / |N|`` changes by the unit normal
+    times dw, and by ``(w - D N / |N|) / |N|``, which is what of w lies in their plane, times dN.
+    """
+    start, end, first, second = _diagonals(x)
+    normal, offset = cross(first, second), end - start
+    inverse = dot(normal, normal).rsqrt()
+    unit = inverse * normal
+    turning = inverse * (offset - dot(offset, unit) * unit)
+    at_first, at_second = cross(second, turning), cross(turning, first)
+    return derivative_rows([-at_first - unit, unit - at_second, at_first, at_second])
+
+
+def _diagonals(x: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """(3, n) where the diagonals of quads start, and the diagonals."""
+    corners = components_first(x)
+    return corners[:, 0], corners[:, 1], corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
 
 
 def planarity_terms(topology: Topology, faces: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
@@ -36,4 +57,13 @@ def planarity_terms(topology: Topology, faces: Tensor, *, weight: float, block: 
     stencil = torch.cat(rows) if rows else torch.zeros(0, 4, dtype=torch.int64, device=topology.device)
     if not stencil.numel():
         return []
-    return [ElementTerm("planarity", diagonal_distance, [(block, stencil)], weight=weight)]
+    return [
+        ElementTerm(
+            "planarity",
+            diagonal_distance,
+            [(block, stencil)],
+            weight=weight,
+            jacobian=diagonal_distance_gradient,
+            batched=True,
+        )
+    ]

@@ -62,14 +62,14 @@ class SegmentFeet:
         rises = [number * part for number, part in enumerate(slopes)][1:]
         at_low, at_high = _polynomial(slopes, low), _polynomial(slopes, high)
         secant = low - at_low * (high - low) / (at_high - at_low)
-        u = torch.where(at_high > at_low, secant.clamp(low, high), 0.5 * (low + high))
+        u = torch.where(at_high > at_low, secant.clamp(low, high), torch.lerp(low, high, 0.5))
         for _ in range(_STEPS):
             value, rise = _polynomial(slopes, u), _polynomial(rises, u)
             falls = value < 0.0
             low, high = torch.where(falls, u, low), torch.where(falls, high, u)
-            step = u - value / rise
-            inside = (rise > 0.0) & (step >= low) & (step <= high)
-            u = torch.where(inside, step, 0.5 * (low + high))
+            # Where the slope does not rise, the step leads out of the bracket, or is not finite.
+            step = torch.addcdiv(u, value, rise, value=-1.0)
+            u = torch.where(step == step.clamp(low, high), step, torch.lerp(low, high, 0.5))
         u = torch.where(u < _ROUNDING, 0.0, u)
         return torch.where(u > 1.0 - _ROUNDING, 1.0, u)
 

@@ -127,7 +127,7 @@ class SplineCurves:
         with torch.no_grad():
             chunks = zip(torch.split(points.detach(), _CHUNK), torch.split(curves.long(), _CHUNK), strict=True)
             parts = [self._closest(some.to(self._coefficients.dtype), mine) for some, mine in chunks]
-            joined = (torch.cat(part) for part in zip(*parts, strict=True))
+            joined = parts[0] if len(parts) == 1 else [torch.cat(part) for part in zip(*parts, strict=True)]
             return SplineFeet(*(x.to(points.dtype) if x.is_floating_point() else x for x in joined))
 
     def _closest(self, points: Tensor, curves: Tensor) -> SplineFeet:

@@ -9,8 +9,6 @@ from .damping import Damping
 from .result import Status
 from .settings import ProjectionSettings
 
-_PATIENCE_WHEN_DAMPED = 4
-
 
 @dataclass(frozen=True)
 class Standing:
@@ -116,7 +114,7 @@ class Course:
             tried,
             standing=standing,
             damping=outcome.damping.accepted(outcome.gain),
-            falls=(*self.falls, fall)[-_PATIENCE_WHEN_DAMPED * settings.patience :],
+            falls=(*self.falls, fall)[-settings.patience_when_damped * settings.patience :],
             doubted=False,
         )
         if outcome.short:
@@ -133,7 +131,7 @@ class Course:
         if self.standing.is_flat(settings):
             return replace(self, suspicion=Status.GRADIENT_TOLERANCE)
         heavy = damping > settings.initial_damping and settings.when_settled != "go on"
-        patience = settings.patience * (_PATIENCE_WHEN_DAMPED if heavy else 1)
+        patience = settings.patience * (settings.patience_when_damped if heavy else 1)
         if len(self.falls) < patience or max(self.falls[-patience:]) >= settings.merit_tolerance:
             return self
         if inexact and self.accuracy > tightest_accuracy(settings):

@@ -27,7 +27,8 @@ class ProjectionSettings:
             stiffness; or when the merit is below what a change of the unknowns by this fraction makes of it.
         merit_tolerance: Stop when each of the last ``patience`` accepted steps lowered the merit by less than this
             fraction.
-        patience: See ``merit_tolerance``. Four times as many where the damping is above its start, unless runs go on.
+        patience: See ``merit_tolerance``.
+        patience_when_damped: Patience is so many times as long where the damping is above its start, unless runs go on.
         when_settled: What happens when one of these tests is met. ``"go on"`` ends the run only at a minimum, where an
             undamped step promises no fall of the merit by more than ``merit_tolerance``; ``"judge"`` ends it and says
             whether it is one; ``"stop"`` ends it without asking, as stages do that others follow.
@@ -52,6 +53,7 @@ class ProjectionSettings:
     step_tolerance: float = 1e-10
     merit_tolerance: float = 1e-9
     patience: int = 3
+    patience_when_damped: int = 4
     when_settled: str = "go on"
     least_extrapolation: float = 1.25
     least_uncorrected_gain: float = 0.9
@@ -75,6 +77,7 @@ class ProjectionSettings:
             raise SettingsError(f"when_settled must be 'go on', 'judge' or 'stop', got {self.when_settled!r}")
         check_count("max_iterations", self.max_iterations, least=0)
         check_count("patience", self.patience, least=1)
+        check_count("patience_when_damped", self.patience_when_damped, least=1)
         check_number("initial_damping", self.initial_damping, above=True, finite=True)
         for name in ("gradient_tolerance", "step_tolerance", "merit_tolerance"):
             check_number(name, getattr(self, name))

@@ -8,7 +8,8 @@ from functools import cached_property
 from torch import Tensor
 
 from ...energies import normal_variation
-from ...geometry import corner_angles, face_areas, face_normals
+from ...geometry import corner_angles, face_area_vectors
+from ...geometry._ops import dot, norm
 from ...projection.layout import State
 from ...topology import Topology
 
@@ -35,32 +36,55 @@ class FairGuard:
         smallest_area: float,
         from_last: bool,
     ) -> None:
-        self.vertices, self.topology, self.placed = vertices, topology, placed
+        self.topology, self.placed = topology, placed
         self._smallest_angle, self._from_last = smallest_angle, from_last
-        self._smallest_areas = smallest_area * face_areas(vertices, topology)
+        self._start = _Mesh(vertices, topology)
+        self._smallest_areas = smallest_area * norm(self._start.area_vectors)
+        self._known: list[tuple[Tensor, _Mesh]] = []
 
     def keeps_faces(self, state: State, trial: State) -> bool:
         """Whether no face turns over."""
-        before = face_normals(self.placed(state), self.topology) if self._from_last else self._normals
-        after = face_normals(self.placed(trial), self.topology)
-        return bool(((before * after).sum(1) > 0.0).all())
+        before = self._mesh(state).area_vectors if self._from_last else self._start.area_vectors
+        return bool((dot(before, self._mesh(trial).area_vectors) > 0.0).all())
 
     def keeps_bounds(self, trial: State) -> bool:
         """Whether no corner angle and no face area falls below its bound where gliding vertices are put in place."""
-        after = self.placed(trial)
-        if after is trial["vertices"]:
+        after = self._mesh(trial)
+        if after.vertices is trial["vertices"]:
             return True  # barriers see the same mesh
-        angles, areas = corner_angles(after, self.topology), face_areas(after, self.topology)
-        return bool((angles >= self._smallest_angle).all() & (areas >= self._smallest_areas).all())
+        if not bool((norm(after.area_vectors) >= self._smallest_areas).all()):
+            return False
+        return bool((corner_angles(after.vertices, self.topology) >= self._smallest_angle).all())
 
     def keeps_energy(self, trial: State) -> bool:
         """Whether E does not rise above that of the start."""
-        return float(normal_variation(self.placed(trial), self.topology)) <= self._energy
+        return self._mesh(trial).energy <= self._start.energy
+
+    def energy(self, state: State) -> float:
+        """E of the mesh of a state."""
+        return self._mesh(state).energy
+
+    def _mesh(self, state: State) -> _Mesh:
+        """That of a state; the last two are kept, since the next step starts from the trial that was admitted."""
+        vertices = state["vertices"]
+        for known, mesh in self._known:
+            if known is vertices:
+                return mesh
+        mesh = _Mesh(self.placed(state), self.topology)
+        self._known = [(vertices, mesh), *self._known[:1]]
+        return mesh
+
+
+class _Mesh:
+    """A mesh and what is asked about it, found when it is asked for first."""
+
+    def __init__(self, vertices: Tensor, topology: Topology) -> None:
+        self.vertices, self._topology = vertices, topology
 
     @cached_property
-    def _energy(self) -> float:
-        return float(normal_variation(self.vertices, self.topology))
+    def area_vectors(self) -> Tensor:
+        return face_area_vectors(self.vertices, self._topology)
 
     @cached_property
-    def _normals(self) -> Tensor:
-        return face_normals(self.vertices, self.topology)
+    def energy(self) -> float:
+        return float(normal_variation(self.vertices, self._topology))

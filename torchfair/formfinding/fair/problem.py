@@ -84,7 +84,7 @@ class FairProblem:
         before, self.design_mode = self.design_mode, self._leaves_reference()
         self.has_other_goals = bool(self.pulls.pulled.any()) or self._has_other_reference
         self.pulls.version += before != self.design_mode
-        self.__dict__.pop("_guard", None)
+        self.__dict__.pop("guard", None)
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""
@@ -288,11 +288,12 @@ class FairProblem:
 
         E may rise where handles, another reference or planarity ask for a different shape.
         """
-        kept = self._guard.keeps_faces(state, trial) and self._guard.keeps_bounds(trial)
-        return kept and (self.has_other_goals or self._guard.keeps_energy(trial))
+        kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
+        return kept and (self.has_other_goals or self.guard.keeps_energy(trial))
 
     @cached_property
-    def _guard(self) -> FairGuard:
+    def guard(self) -> FairGuard:
+        """What judges the meshes of states."""
         bounded = self.settings.quality_weight > 0.0
         return FairGuard(
             self.vertices,

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 from torch import Tensor
 
-from ...energies import normal_variation
 from ...projection import Callback
 from ...projection.layout import State
 from ...topology import Topology
@@ -75,7 +74,7 @@ class FairRecipe(Recipe[FairSettings]):
 
     def observe(self, state: State) -> dict[str, float]:
         """E, in the unit of the input."""
-        return {"normal_variation": self.unit.length * float(normal_variation(self.placed(state), self.topology))}
+        return {"normal_variation": self.unit.length * self.problem.guard.energy(state)}
 
     def stays(self) -> Tensor:
         """Boundary vertices or corners, as the settings say, unless they are pulled."""

@@ -96,6 +96,12 @@ class FairSettings:
             check_number("distance_limit (or None)", self.distance_limit, above=True)
 
     def stage(self) -> ProjectionSettings:
-        """Settings of a stage before the last: fewer steps, wider tolerance."""
-        most = min(20, self.projection.max_iterations)
-        return replace(self.projection, max_iterations=most, merit_tolerance=4e-3, patience=6, when_settled="stop")
+        """Settings of a stage before the last: fewer steps, wider tolerance, no waiting for what damping holds back."""
+        return replace(
+            self.projection,
+            max_iterations=min(20, self.projection.max_iterations),
+            merit_tolerance=4e-3,
+            patience=6,
+            patience_when_damped=1,
+            when_settled="stop",
+        )
