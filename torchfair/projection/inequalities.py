@@ -8,9 +8,10 @@ import torch
 from torch import Tensor
 
 from ..linear import LinearSolver
+from .linear_system import LinearSystem
 from .loss import is_one_sided
 from .proposal import Proposal
-from .system import LinearSystem, Structure
+from .system import Structure
 
 _MOST_SOLVES = 6
 _ENOUGH = 0.1  # of the fall of the model: cost of inequalities wrongly heeded or ignored that is worth a solve

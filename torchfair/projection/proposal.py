@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from ..linear import Factor, LinearSolver
-from .system import Evaluation, LinearSystem
+from .linear_system import LinearSystem
+from .system import Evaluation
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from torch import Tensor
 
 from .course import Course
 from .inequalities import Inequalities
+from .linear_system import LinearSystem
 from .settings import ProjectionSettings
-from .system import Evaluation, LinearSystem
+from .system import Evaluation
 
 
 @dataclass(frozen=True)
