@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -41,6 +41,24 @@ class LinearSystem:
         self.residuals = residuals
         self.roots = roots
         self.affine_residual = affine_residual
+
+    def without(self, members: Collection[int]) -> LinearSystem:
+        """The same without what some members of a batch have that is not linear: zeros there."""
+        gone = torch.zeros(self.structure.layout.members, dtype=torch.bool)
+        gone[list(members)] = True
+        gone = gone.to(self.structure.device)
+
+        def kept(part: Tensor) -> Tensor:
+            return torch.where(gone.repeat_interleave(part.shape[-1] // gone.shape[0]), 0.0, part)
+
+        roots = [kept(root.movedim(0, -1)).movedim(-1, 0) for root in self.roots]
+        return LinearSystem(
+            self.structure,
+            [kept(jacobian) for jacobian in self.jacobians],
+            [kept(residual) for residual in self.residuals],
+            roots,
+            self.affine_residual,
+        )
 
     @cached_property
     def gradient(self) -> Tensor:

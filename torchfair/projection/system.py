@@ -20,6 +20,7 @@ from .layout import Layout, State
 from .linear_system import LinearSystem
 from .loss import apply_root
 from .normal_pattern import NormalPattern
+from .replicate import first_members
 from .row_pattern import RowPattern
 from .term import ElementTerm
 
@@ -163,19 +164,69 @@ class Structure:
 
     def evaluate(self, state: State) -> Evaluation:
         """Residuals and merit of a state."""
-        arguments, values, parts = [], [], [self._like.new_zeros(self.layout.members)]
-        for term in (compiled.term for compiled in self.compiled):
+        affine = None if self.affine is None else self.affine.residual(self.layout.flatten(state))
+        return self._evaluated(state, [compiled.term for compiled in self.compiled], self.layout.members, affine)
+
+    def evaluate_members(self, flat: Tensor, chosen: list[int]) -> Evaluation:
+        """Residuals and merits of some members of a batch alone; those of linear terms for all of them.
+
+        Args:
+            flat: (N,) the state of all members.
+            chosen: Numbers of members.
+        """
+        blocks = self.layout.unflatten(self.layout.chosen_members(flat, chosen), len(chosen))
+        affine = None if self.affine is None else self.affine.residual(flat)
+        terms = [first_members(c.term, c.term.num_elements // self.layout.members * len(chosen)) for c in self.compiled]
+        return self._evaluated(blocks, terms, len(chosen), affine, chosen)
+
+    def _evaluated(
+        self,
+        state: State,
+        terms: Sequence[ElementTerm],
+        count: int,
+        affine: Tensor | None,
+        chosen: list[int] | None = None,
+    ) -> Evaluation:
+        arguments, values, parts = [], [], [self._like.new_zeros(count)]
+        for term in terms:
             arguments.append(term.arguments(state))
             values.append(term.values(arguments[-1]))
             contributions = term.contributions(arguments[-1], values[-1])
-            parts.append(contributions.view(self.layout.members, -1).sum(1).to(self._like))
-        affine = None
-        if self.affine is not None:
-            affine = self.affine.residual(self.layout.flatten(state))
-            parts.append(0.5 * self.affine.member_sums(affine.square(), self.layout.members))
+            parts.append(contributions.view(count, -1).sum(1).to(self._like))
+        if self.affine is not None and affine is not None:
+            own = 0.5 * self.affine.member_sums(affine.square(), self.layout.members)
+            parts.append(own if chosen is None else own[chosen])
         merits = torch.stack(parts).sum(0)
         merits = torch.where(torch.isfinite(merits), merits, torch.inf)
         return Evaluation(state, merits, arguments, values, affine)
+
+    def with_members(
+        self, at: Evaluation, flat: Tensor, part: Evaluation, chosen: list[int], rows: list[int]
+    ) -> Evaluation:
+        """An evaluation in which some members have another state.
+
+        Args:
+            at: Of all members.
+            flat: (N,) the new state of all.
+            part: Of these members, or of more.
+            chosen: Their numbers.
+            rows: Their places in ``part``.
+        """
+        members, places, sources = self.layout.members, torch.tensor(chosen), torch.tensor(rows)
+        places, sources = places.to(self.device), sources.to(self.device)
+
+        def mixed(old: Tensor, new: Tensor) -> Tensor:
+            size = old.shape[0] // members
+            result = old.clone()
+            result.view(members, size, *old.shape[1:])[places] = new.view(-1, size, *old.shape[1:])[sources]
+            return result
+
+        arguments = [tuple(map(mixed, *pair)) for pair in zip(at.arguments, part.arguments, strict=True)]
+        values = [mixed(*pair) for pair in zip(at.values, part.values, strict=True)]
+        affine = None
+        if self.affine is not None and at.affine is not None and part.affine is not None:
+            affine = self.affine.with_members(at.affine, part.affine, places, members)
+        return Evaluation(self.layout.unflatten(flat), mixed(at.merits, part.merits), arguments, values, affine)
 
     def unknowns_of_infinite_elements(self, at: Evaluation) -> Tensor:
         """(N,) bool: unknowns of elements whose share of the merit is not finite."""
