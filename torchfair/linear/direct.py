@@ -29,9 +29,9 @@ class SparseDirect(ABC):
 
     def prepare(self, pattern: Pattern) -> None:
         """Symbolic work; see the protocol."""
-        if self._lower is None or self._lower.rows is not pattern.lower.rows:
+        if self._lower is None or not self._lower.equals(pattern.lower):
             self.analyse(pattern.lower)
-            self._lower = pattern.lower
+        self._lower = pattern.lower
 
     @abstractmethod
     def analyse(self, lower: LowerTriangle) -> None:

@@ -20,6 +20,7 @@ from .layout import Layout, State
 from .linear_system import LinearSystem
 from .loss import apply_root
 from .normal_pattern import NormalPattern
+from .repeated_pattern import RepeatedPattern
 from .replicate import first_members
 from .row_pattern import RowPattern
 from .term import ElementTerm
@@ -51,10 +52,20 @@ class Structure:
         compiled: Those of them that are not linear.
         affine: The linear ones, None if there are none.
         free: (N,) unknowns that may move.
+
+    Args:
+        single: In a batch, the structure of one member.
     """
 
-    def __init__(self, layout: Layout, terms: Sequence[ElementTerm], free: Tensor, dtype: torch.dtype) -> None:
-        self.layout, self.free = layout, free
+    def __init__(
+        self,
+        layout: Layout,
+        terms: Sequence[ElementTerm],
+        free: Tensor,
+        dtype: torch.dtype,
+        single: Structure | None = None,
+    ) -> None:
+        self.layout, self.free, self._single = layout, free, single
         self._take([CompiledTerm(term, layout) for term in self._checked(terms)], dtype)
         self._like = torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device)
         self._mask()
@@ -87,9 +98,10 @@ class Structure:
         result = copy.copy(self)
         for stale in ("normal_pattern", "block_diagonal", "_outputs"):
             result.__dict__.pop(stale, None)
+        result._single = None
         result._take(compiled, self._like.dtype)
         pattern = self.__dict__.get("normal_pattern")
-        if pattern is not None and pattern.fits(result.affine):
+        if isinstance(pattern, NormalPattern) and pattern.fits(result.affine):
             result.__dict__["normal_pattern"] = pattern.with_constant(result.affine)
         return result
 
@@ -146,8 +158,11 @@ class Structure:
         return torch.stack([self._like.new_zeros(members), *parts]).sum(0)
 
     @cached_property
-    def normal_pattern(self) -> NormalPattern:
+    def normal_pattern(self) -> NormalPattern | RepeatedPattern:
         """Sparsity of the normal matrix and the map into it."""
+        single = None if self._single is None else self._single.normal_pattern
+        if isinstance(single, NormalPattern):
+            return RepeatedPattern(single, self.layout)
         return NormalPattern(self.layout, self.compiled, self.affine, self._like)
 
     @cached_property
