@@ -42,11 +42,12 @@ class BlockByBlock:
         owner, place = np.empty((2, unknowns.size), np.int64)
         owner[unknowns.ravel()], place[unknowns.ravel()] = np.divmod(np.arange(unknowns.size), size)
         columns = np.repeat(np.arange(unknowns.size), np.diff(lower.offsets))
-        keys = (owner[columns] * size + place[columns]) * size + place[lower.rows]
+        first, second = place[lower.rows], place[columns]
+        keys = (owner[columns] * size + np.minimum(first, second)) * size + np.maximum(first, second)
         self._order = None if (np.diff(keys) > 0).all() else torch.from_numpy(np.argsort(keys))
-        first = (keys if self._order is None else keys[self._order.numpy()])[: keys.size // count]
-        offsets = np.searchsorted(first // size, np.arange(size + 1))
-        single = SimpleNamespace(num_unknowns=size, device=pattern.device, lower=LowerTriangle(offsets, first % size))
+        keys = (keys if self._order is None else keys[self._order.numpy()])[: keys.size // count]
+        offsets = np.searchsorted(keys // size, np.arange(size + 1))
+        single = SimpleNamespace(num_unknowns=size, device=pattern.device, lower=LowerTriangle(offsets, keys % size))
         self._solver.prepare(single)
         self._single, self._known = single, lower
 
