@@ -39,6 +39,7 @@ def normal_variation_terms(
                 weight=weight,
                 loss=SmoothAbsolute(smoothing),
                 jacobian=triangle_pair_bend_gradient if is_triangles else None,
+                batched=is_triangles,
             )
         )
     return terms
@@ -81,24 +82,20 @@ def _walk(topology: Topology, start: Tensor, size: int) -> list[Tensor]:
 
 
 def triangle_pair_bend(x: Tensor) -> Tensor:
-    """Signed ``l l*`` of the edge ``x[0] x[1]`` between triangles with apexes ``x[2]`` (left) and ``x[3]``.
+    """Signed ``l l*`` (*n,) of edges between triangles; corners ``x`` (*n, 4, 3): ends, apex on the left, on the right.
 
     Positive where convex; ``2 sin(a/2)`` is written as ``sin a sqrt(2 / (1 + cos a))``, smooth at a = 0.
     """
-    edge, left_side, right_side = x[1] - x[0], x[2] - x[0], x[3] - x[0]
-    left, right = cross(edge, left_side), cross(right_side, edge)
-    size = vector_norm(left) * vector_norm(right)
+    edge, left_side, right_side = _sides(x)
+    left, right = _cross(edge, left_side), _cross(right_side, edge)
+    size = torch.sqrt(_dot(left, left)) * torch.sqrt(_dot(right, right))
     # (left x right) . edge = -|edge|^2 (left . right_side), so that sin a = -|edge| (left . right_side) / size.
-    bend: Tensor = (
-        -torch.dot(edge, edge)
-        * torch.dot(left, right_side)
-        * torch.sqrt(2.0 / (size * (size + torch.dot(left, right))))
-    )
+    bend: Tensor = -_dot(edge, edge) * _dot(left, right_side) * torch.sqrt(2.0 / (size * (size + _dot(left, right))))
     return bend
 
 
 def triangle_pair_bend_gradient(x: Tensor) -> Tensor:
-    """Gradient ``(12,)`` of :func:`triangle_pair_bend` in closed form: ``l* dl + l cos(a/2) da``.
+    """Gradient ``(*n, 12)`` of :func:`triangle_pair_bend` in closed form: ``l* dl + l cos(a/2) da``.
 
     With N the normal of a triangle, twice its area long, the dihedral angle turns with the apex of that
     triangle as ``da = -l N / |N|^2``, and with the ends of the edge by the shares at which the foot of the
@@ -109,18 +106,36 @@ def triangle_pair_bend_gradient(x: Tensor) -> Tensor:
            /  |   .
           0---+-----1        share of end 1: |0 +| / |0 1|
     """
-    edge, left_side, right_side = x[1] - x[0], x[2] - x[0], x[3] - x[0]
-    left, right = cross(edge, left_side), cross(right_side, edge)
-    squared = torch.dot(edge, edge)
-    left_squared, right_squared = torch.dot(left, left), torch.dot(right, right)
-    size = torch.sqrt(left_squared * right_squared)
-    cosine_sum = size + torch.dot(left, right)
+    edge, left_side, right_side = _sides(x)
+    left, right = _cross(edge, left_side), _cross(right_side, edge)
+    squared = _dot(edge, edge)
+    left_squared, right_squared = _dot(left, left), _dot(right, right)
+    size = torch.sqrt(left_squared) * torch.sqrt(right_squared)
+    cosine_sum = size + _dot(left, right)
     turn = -squared * torch.sqrt(cosine_sum / (2.0 * size))
     at_left, at_right = turn / left_squared * left, turn / right_squared * right
-    stretch = -torch.dot(left, right_side) * torch.sqrt(2.0 / (size * cosine_sum)) * edge
-    left_share, right_share = torch.dot(left_side, edge) / squared, torch.dot(right_side, edge) / squared
+    stretch = -_dot(left, right_side) * torch.sqrt(2.0 / (size * cosine_sum)) * edge
+    left_share, right_share = _dot(left_side, edge) / squared, _dot(right_side, edge) / squared
     at_end = stretch - left_share * at_left - right_share * at_right
-    return torch.cat([-(at_end + at_left + at_right), at_end, at_left, at_right])
+    return torch.cat([-(at_end + at_left + at_right), at_end, at_left, at_right]).movedim(0, -1)
+
+
+def _sides(x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Edge, left and right side (3, *n) from the first corner; components first, which makes long rows of numbers."""
+    corners = x.movedim((-2, -1), (0, 1)).contiguous()
+    edge, left, right = (corners[1:] - corners[0]).unbind()
+    return edge, left, right
+
+
+def _cross(a: Tensor, b: Tensor) -> Tensor:
+    """Of (3, *n) vectors."""
+    parts = [a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3)]
+    return torch.stack(parts)
+
+
+def _dot(a: Tensor, b: Tensor) -> Tensor:
+    """(*n,) of (3, *n) vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _polygon_residual(size: int) -> Callable[[Tensor], Tensor]:
