@@ -44,7 +44,8 @@ from torus_problem import torus_problem
 import torchfair
 from torchfair.linear import ConjugateGradients, Factor, RslabDirect, ScipyDirect, Solution
 from torchfair.projection import GuidedProjection, IterationRecord, ProjectionSettings
-from torchfair.projection.system import LinearSystem, Structure
+from torchfair.projection.linear_system import LinearSystem
+from torchfair.projection.system import Structure
 
 PARTS = ("jacobian", "assembly", "factor", "solve", "merit", "other", "whole")
 COLUMNS = (*PARTS, "corrected")

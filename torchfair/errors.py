@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -47,4 +48,12 @@ class SettingsError(TorchfairError):
 
 
 class SingularSystemError(TorchfairError):
-    """A linear solver met a matrix that is singular, indefinite or not finite."""
+    """A linear solver met a matrix that is singular, indefinite or not finite.
+
+    Attributes:
+        blocks: numbers of the diagonal blocks that are to blame, None where the solver knows none.
+    """
+
+    def __init__(self, message: str, blocks: Sequence[int] | None = None) -> None:
+        super().__init__(message)
+        self.blocks = None if blocks is None else tuple(blocks)

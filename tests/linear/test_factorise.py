@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -13,7 +14,17 @@ from torch import Tensor
 
 from torchfair import ShapeError
 from torchfair.errors import SettingsError, SingularSystemError
-from torchfair.linear import BlockDense, ConjugateGradients, MatrixSystem, RslabDirect, choose_solver, factorise
+from torchfair.linear import (
+    BlockByBlock,
+    BlockDense,
+    ConjugateGradients,
+    LinearSolver,
+    MatrixSystem,
+    RslabDirect,
+    ScipyDirect,
+    choose_solver,
+    factorise,
+)
 
 SOLVERS = ["dense", "scipy", "cg", "auto", *(["rslab"] if RslabDirect.available() else [])]
 
@@ -85,6 +96,38 @@ def test_other_things_than_square_floating_matrices_are_refused(matrix: object) 
         factorise(matrix)
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    ("right", "given"),
+    [
+        (torch.ones(48, dtype=torch.float64), r"\(49,\) or \(49, k\).*\(49, 49\), got \(48,\)"),
+        (torch.ones(1, 49, dtype=torch.float64), r"got \(1, 49\)"),
+        (torch.ones(49, 1, 1, dtype=torch.float64), r"got \(49, 1, 1\)"),
+        (torch.ones(49, dtype=torch.int64), r"floating numbers .* torch.int64"),
+        (np.ones(49), "NumPy array"),
+    ],
+)
+def test_other_right_hand_sides_are_refused_with_both_lengths(solver: str, right: object, given: str) -> None:
+    factor = factorise(grid_laplacian(), solver=solver)
+    with pytest.raises(ShapeError, match=f"right-hand side.*{given}"):
+        factor.solve(right)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_right_hand_sides_in_single_precision_have_solutions_in_single_precision(solver: str) -> None:
+    right = torch.linspace(0.0, 1.0, 49)
+    values = factorise(grid_laplacian(), solver=solver).solve(right, 1e-8).values
+    assert values.dtype == torch.float32
+    expected = torch.linalg.solve(torch.from_numpy(grid_laplacian().toarray()).float(), right)
+    torch.testing.assert_close(values, expected, atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("damping", [torch.ones(48), torch.ones(49, dtype=torch.int64), 1.0])
+def test_other_dampings_are_refused(damping: object) -> None:
+    with pytest.raises(ShapeError, match=r"damping: expected .*\(49,\)"):
+        factorise(grid_laplacian(), damping)
+
+
 def test_unknown_solvers_are_refused_with_the_known_ones() -> None:
     with pytest.raises(SettingsError, match="choose auto, dense, scipy"):
         factorise(grid_laplacian(), solver="magic")
@@ -122,8 +165,18 @@ def test_an_own_solver_is_used() -> None:
     assert solver.prepared == 1
 
 
-def test_blocks_are_solved_as_the_whole_matrix_is() -> None:
+BLOCK_SOLVERS: dict[str, Callable[[Tensor], LinearSolver]] = {
+    "dense": BlockDense,
+    "scipy": lambda unknowns: BlockByBlock(unknowns, ScipyDirect()),
+}
+if RslabDirect.available():
+    BLOCK_SOLVERS["rslab"] = lambda unknowns: BlockByBlock(unknowns, RslabDirect())
+
+
+@pytest.mark.parametrize("blocks", BLOCK_SOLVERS)
+def test_blocks_are_solved_as_the_whole_matrix_is(blocks: str) -> None:
     """Two blocks whose unknowns alternate, in another order in each."""
+    solver = BLOCK_SOLVERS[blocks]
     generator = torch.Generator().manual_seed(0)
     unknowns = torch.tensor([[0, 2, 4, 6], [5, 1, 7, 3]])
     matrix = torch.zeros(8, 8, dtype=torch.float64)
@@ -132,12 +185,27 @@ def test_blocks_are_solved_as_the_whole_matrix_is() -> None:
         matrix[rows[:, None], rows] = half @ half.T
     damping = torch.linspace(0.1, 0.8, 8, dtype=torch.float64)
     right = torch.randn(8, 3, dtype=torch.float64, generator=generator)
-    factor = factorise(matrix, damping, solver=BlockDense(unknowns))
+    factor = factorise(matrix, damping, solver=solver(unknowns))
     expected = torch.linalg.solve(matrix + torch.diag(damping), right)
     torch.testing.assert_close(factor.solve(right).values, expected, atol=1e-10, rtol=0)
     torch.testing.assert_close(factor.solve(right[:, 1]).values, expected[:, 1], atol=1e-10, rtol=0)
+    if blocks == "scipy":
+        return  # SuperLU does not tell the signs of its pivots
     with pytest.raises(SingularSystemError, match="2 blocks of the matrix are not positive definite"):
-        factorise(matrix, -100.0 * damping, solver=BlockDense(unknowns))
+        factorise(matrix, -100.0 * damping, solver=solver(unknowns))
+    damping[unknowns[1]] *= -100.0
+    with pytest.raises(SingularSystemError) as caught:
+        factorise(matrix, damping, solver=solver(unknowns))
+    assert caught.value.blocks == (1,)
+
+
+def test_factors_of_dense_blocks_that_are_still_used_keep_their_numbers() -> None:
+    """Memory is taken again only when the factor is gone, also by a copy of the solver."""
+    solver, right = BlockDense(torch.arange(4).view(2, 2)), torch.ones(4, dtype=torch.float64)
+    first = factorise(2.0 * torch.eye(4, dtype=torch.float64), solver=solver)
+    for other in (solver, copy.copy(solver)):
+        factorise(8.0 * torch.eye(4, dtype=torch.float64), solver=other)
+        assert first.solve(right).values.tolist() == pytest.approx([0.5] * 4)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -11,7 +11,8 @@ from torch import Tensor
 from torchfair.linear import ConjugateGradients, DenseQR, RslabDirect, ScipyDirect
 from torchfair.projection import ElementTerm, SmoothAbsolute
 from torchfair.projection.layout import Layout
-from torchfair.projection.system import LinearSystem, Structure
+from torchfair.projection.linear_system import LinearSystem
+from torchfair.projection.system import Structure
 
 
 def stretched(x: Tensor, length: Tensor) -> Tensor:

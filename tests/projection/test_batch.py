@@ -180,20 +180,49 @@ def test_an_empty_batch_has_no_results() -> None:
     assert problem.solve_batch({"x": starts[:0]}) == []
 
 
-def test_members_that_go_on_without_the_others_take_their_state_along() -> None:
-    """Blocks, stiffness met, and inequalities heeded are those of the same member alone."""
+@pytest.mark.parametrize("chosen", [[2, 6], [6, 2]])
+def test_members_that_go_on_without_the_others_take_their_state_along(chosen: list[int]) -> None:
+    """Blocks, stiffness met, and inequalities heeded are those of the same member alone, in the order chosen."""
     problem, starts = net()
     together = problem.batched(7)
     state, _ = steps.step(together, steps.init(together, {"x": starts.flatten(0, 1)}))
-    _, smaller = steps.of_members(problem, state, [2, 6])
-    alone = [steps.step(problem, steps.init(problem, {"x": starts[member]}))[0] for member in (2, 6)]
+    _, smaller = steps.of_members(problem, state, chosen)
+    alone = [steps.step(problem, steps.init(problem, {"x": starts[member]}))[0] for member in chosen]
     assert not torch.equal(alone[0].heeded, alone[1].heeded)
     assert torch.equal(smaller.heeded, torch.cat([one.heeded for one in alone]))
+    assert [course.merit for course in smaller.courses] == pytest.approx([one.merit for one in alone], rel=1e-9)
     for mine, others in (
         (smaller.blocks["x"], [one.blocks["x"] for one in alone]),
         (smaller.linearised.stiffness, [one.linearised.stiffness for one in alone]),
     ):
         torch.testing.assert_close(mine, torch.cat(others), atol=1e-9, rtol=0)
+
+
+def test_the_matrix_of_a_batch_holds_that_of_every_member() -> None:
+    """Two blocks, and elements that name a node twice; the fast way against a matrix for each member."""
+    rows = torch.tensor([[0, 1], [2, 2], [3, 1]])
+
+    def mixed(x: Tensor, s: Tensor) -> Tensor:
+        return x[0, :2] * x[1, 1:] + s[0, 0] * s[1, 0]
+
+    terms = [
+        ElementTerm("mixed", mixed, [("x", rows), ("s", rows)]),
+        ElementTerm("held", held, [("s", rows[:, :1])], data=(torch.ones(3, 1, dtype=DOUBLE),), linear=True),
+    ]
+    generator = torch.Generator().manual_seed(0)
+    shapes = {"x": (4, 4, 3), "s": (4, 4, 1)}
+    starts = {name: torch.randn(shape, dtype=DOUBLE, generator=generator) for name, shape in shapes.items()}
+    problem = GuidedProjection({name: block[0] for name, block in starts.items()}, terms)
+    batch = problem.batched(4)
+    whole = batch.structure.linearise({name: block.flatten(0, 1) for name, block in starts.items()})
+    lower = batch.structure.lower.matrix(whole.lower_values.numpy()).toarray()
+    for member, unknowns in enumerate(batch.layout.member_unknowns().numpy()):
+        one = problem.structure.linearise({name: block[member] for name, block in starts.items()})
+        expected = problem.structure.lower.matrix(one.lower_values.numpy()).toarray()
+        assert lower[unknowns[:, None], unknowns] == pytest.approx(expected, abs=1e-12)
+        lower[unknowns[:, None], unknowns] = 0.0
+    assert not lower.any()
+    assert (batch.structure.lower.rows[batch.structure.lower.diagonal] == range(64)).all()
 
 
 def test_batches_of_other_terms_are_not_those_of_the_terms_before() -> None:
@@ -203,3 +232,35 @@ def test_batches_of_other_terms_are_not_those_of_the_terms_before() -> None:
     again = problem.with_terms([replace(term, weight=3.0 * term.weight + 1.0) for term in problem.terms])
     alone = [again.solve({"x": start}, settings=settings) for start in starts[:2]]
     assert_same(again.solve_batch({"x": starts[:2]}, settings=settings), alone)
+
+
+def drawn(x: Tensor) -> Tensor:
+    return x[0]
+
+
+def drawn_gradient(x: Tensor) -> Tensor:
+    """Not a number in a band: members that step into it stay there."""
+    return torch.where((x[0, 0] - 5.0).abs() < 0.5, torch.nan, torch.eye(3).to(x))
+
+
+@pytest.mark.parametrize("one_sided", [False, True])
+@pytest.mark.parametrize(("solver", "count"), [("auto", 40), ("scipy", 100), ("cg", 40)])
+def test_a_member_that_stays_singular_ends_alone(solver: str, count: int, one_sided: bool) -> None:
+    """Steps halve the distance: from ten, members come to where a derivative is not a number."""
+    nodes = torch.arange(count)[:, None]
+    terms = [
+        ElementTerm("drawn", drawn, [("x", nodes)], jacobian=drawn_gradient, weight=1e-3),
+        ElementTerm("held", held, [("x", nodes)], data=(torch.ones(count, 3, dtype=DOUBLE),), weight=1e-6, linear=True),
+        ElementTerm("length", stretched, [("x", torch.cat([nodes[1:], nodes[:-1]], 1))], weight=1e-6),
+    ]
+    if one_sided:
+        terms.append(ElementTerm("ceiling", below, [("x", nodes)], weight=1e-6, loss=OneSided()))
+    noise = 0.1 * torch.randn(5, count, 3, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
+    starts = torch.tensor([1.0, 10.0, 2.0, 10.5, -3.0], dtype=DOUBLE)[:, None, None] + noise
+    settings = ProjectionSettings(max_iterations=20, initial_damping=1e-3, damping_scale="identity", accuracy=1e-10)
+    problem = GuidedProjection({"x": starts[0]}, terms, solver=solver)
+    together = problem.solve_batch({"x": starts}, settings=settings)
+    alone = [problem.solve({"x": start}, settings=settings) for start in starts]
+    assert [number for number, one in enumerate(alone) if one.status is Status.SINGULAR] == [1, 3]
+    assert [one.message for one in together] == [one.message for one in alone]
+    assert_same(together, alone)

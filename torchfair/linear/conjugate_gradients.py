@@ -7,6 +7,7 @@ from torch import Tensor
 
 from ..errors import SingularSystemError
 from .base import Pattern, Solution, System
+from .checked_right import check_right
 
 _CHECK_EVERY = 10  # iterations on other devices than the CPU, where looking at a number makes everything wait
 
@@ -45,6 +46,8 @@ class ConjugateGradientFactor:
 
     def solve(self, right: Tensor, accuracy: float = 0.0) -> Solution:
         """All right-hand sides at once, each with steps of its own; see the protocol."""
+        check_right(right, self._damping.shape[0])
+        given, right = right, right.to(self._inverse.dtype)
         damping = self._damping if right.ndim == 1 else self._damping[:, None]
         every = 1 if right.device.type == "cpu" else _CHECK_EVERY
         remainder = right.clone()
@@ -69,7 +72,7 @@ class ConjugateGradientFactor:
             direction = preconditioned.addcmul_(torch.where(active, energy / previous, 0.0), direction)
             iterations += 1
         _is_done(healthy, healthy)
-        return Solution(change, remainder, iterations)
+        return Solution(change.to(given), remainder.to(given), iterations)
 
 
 def _is_done(active: Tensor, healthy: Tensor) -> bool:

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from ..errors import SingularSystemError
 from .base import Pattern, Solution, System
+from .checked_right import check_right
 
 _REFINEMENTS = 2
 
@@ -47,7 +48,8 @@ class DenseFactor:
 
     def solve(self, right: Tensor, accuracy: float = 0.0) -> Solution:
         """See the protocol."""
-        columns = right if right.ndim == 2 else right[:, None]
+        check_right(right, self._triangle.shape[0])
+        columns = (right if right.ndim == 2 else right[:, None]).to(self._triangle.dtype)
         solution, remainder = torch.zeros_like(columns), columns
         for _ in range(1 + _REFINEMENTS):
             middle = torch.linalg.solve_triangular(self._triangle.T, remainder, upper=False)
@@ -55,7 +57,7 @@ class DenseFactor:
             remainder = columns - self._stacked.T @ (self._stacked @ solution)
         if not bool(torch.isfinite(solution).all()):
             raise SingularSystemError("the matrix is singular to working precision")
-        values = solution.reshape(right.shape)
+        values = solution.reshape(right.shape).to(right)
         return Solution(values, torch.zeros_like(values))
 
 

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from ..errors import SingularSystemError
 from .base import Pattern, Solution, System
+from .checked_right import check_right
 from .lower_triangle import LowerTriangle
 
 TIGHTEST = 1e-12  # relative remainder of every solution, so that results do not depend on how sums are rounded
@@ -28,9 +29,9 @@ class SparseDirect(ABC):
 
     def prepare(self, pattern: Pattern) -> None:
         """Symbolic work; see the protocol."""
-        if self._lower is None or self._lower.rows is not pattern.lower.rows:
+        if self._lower is None or not self._lower.equals(pattern.lower):
             self.analyse(pattern.lower)
-            self._lower = pattern.lower
+        self._lower = pattern.lower
 
     @abstractmethod
     def analyse(self, lower: LowerTriangle) -> None:
@@ -58,17 +59,18 @@ class SparseDirect(ABC):
 
     def factorise(self, system: System, damping: Tensor) -> DirectFactor:
         """See the protocol."""
-        return DirectFactor(self.factor(self.assemble(system, damping)))
+        return DirectFactor(self.factor(self.assemble(system, damping)), damping.shape[0])
 
 
 class DirectFactor:
     """A factor whose solutions have no remainder to speak of."""
 
-    def __init__(self, substitute: Substitution) -> None:
-        self._substitute = substitute
+    def __init__(self, substitute: Substitution, size: int) -> None:
+        self._substitute, self._size = substitute, size
 
     def solve(self, right: Tensor, accuracy: float = TIGHTEST) -> Solution:
         """See the protocol."""
+        check_right(right, self._size)
         solution = self._substitute(right.cpu().numpy().astype(np.float64), accuracy)
         if not np.isfinite(solution).all():
             raise SingularSystemError("the matrix is singular to working precision")

@@ -26,6 +26,12 @@ class LowerTriangle:
         """N."""
         return self.offsets.size - 1
 
+    def equals(self, other: LowerTriangle) -> bool:
+        """Whether the other one has entries in the same places."""
+        if self.rows is other.rows:
+            return True
+        return np.array_equal(self.offsets, other.offsets) and np.array_equal(self.rows, other.rows)
+
     @property
     def diagonal(self) -> Ints:
         """(N,) positions of the diagonal entries."""

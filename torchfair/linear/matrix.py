@@ -101,7 +101,8 @@ def factorise(matrix: Matrix, damping: Tensor | None = None, *, solver: str | Li
         A factor. ``factor.solve(right).values`` is the solution for ``right`` (N,) or (N, k), torch tensors.
 
     Raises:
-        ShapeError: not a square matrix.
+        ShapeError: not a square matrix, or a damping of another length; from ``solve``, a right-hand side of another
+            length, or not of floating numbers.
         SingularSystemError: the matrix is singular, indefinite or not finite. SuperLU (``"scipy"``) and conjugate
             gradients do not always notice that a matrix is indefinite or barely singular.
 
@@ -116,6 +117,9 @@ def factorise(matrix: Matrix, damping: Tensor | None = None, *, solver: str | Li
     chosen.prepare(system.pattern)
     if damping is None:
         damping = torch.zeros(system.pattern.num_unknowns, dtype=torch.float64, device=system.pattern.device)
+    size = system.pattern.num_unknowns
+    if not isinstance(damping, Tensor) or damping.shape != (size,) or not damping.is_floating_point():
+        raise ShapeError("damping", f"a tensor of floating numbers ({size},), one for each unknown", shown(damping))
     return chosen.factorise(system, damping)
 
 

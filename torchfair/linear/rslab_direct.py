@@ -17,7 +17,7 @@ from .direct import TIGHTEST, SparseDirect, Substitution
 from .lower_triangle import LowerTriangle
 
 _REFINEMENTS = 8
-_SMALLEST_RACE = 20_000  # unknowns
+_SMALLEST_RACE = 5_000  # unknowns
 _LEAST_PROGRESS = 0.1  # of a refinement that is worth another one
 
 

@@ -87,6 +87,13 @@ class AffinePart:
         """(members,) sums of (rows,) values over the rows of each member of a batch."""
         return torch.stack([part.view(members, -1).sum(1) for part in torch.split(rows, self._sizes)]).sum(0)
 
+    def with_members(self, rows: Tensor, others: Tensor, chosen: Tensor, members: int) -> Tensor:
+        """(rows,) values, those of the chosen members of a batch from others."""
+        result = rows.clone()
+        for new, old in zip(torch.split(result, self._sizes), torch.split(others, self._sizes), strict=True):
+            new.view(members, -1)[chosen] = old.view(members, -1)[chosen]
+        return result
+
     def member_owners(self, members: int) -> Tensor:
         """(rows,) number of the member that a row belongs to."""
         every = torch.arange(members, device=self.offset.device)

@@ -82,7 +82,8 @@ class BatchRun:
     def _note(self, timings: dict[str, float]) -> None:
         """Records of the last step; results of members that it ended."""
         for place in self._going():
-            self._histories[self._members[place]].append(record_of(self._state, place, timings=timings))
+            if self._state.courses[place].status is not Status.SINGULAR:  # that was no step
+                self._histories[self._members[place]].append(record_of(self._state, place, timings=timings))
         self._retire(None)
 
     def _retire(self, status: Status | None) -> None:

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from ..errors import SingularSystemError
 from .course import Course, tightest_accuracy
+from .damped_solution import culprits
 from .problem import Problem
 from .proposal import Proposal
 from .state import ProjectionState
@@ -28,11 +29,10 @@ def certified(problem: Problem, state: ProjectionState) -> list[bool]:
     undamped step decides, by two more evaluations.
     """
     settings, layout, system = state.settings, problem.layout, state.linearised.system
-    diagonal = torch.where(system.diagonal > 0.0, system.diagonal, 1.0)
-    try:
-        proposal = _undamped(problem, state, _PROBE * diagonal)
-    except SingularSystemError:
+    proposal, singular = _undamped(problem, state)
+    if proposal is None:
         return [False] * layout.members
+    diagonal = torch.where(system.diagonal > 0.0, system.diagonal, 1.0)
     flat = layout.flatten(state.evaluation.state)
     sizes = layout.member_sums(system.diagonal * flat.square())
     merits = state.evaluation.merits
@@ -51,8 +51,8 @@ def certified(problem: Problem, state: ProjectionState) -> list[bool]:
     curved = seen & (0.5 * slopes.square() / torch.where(seen, curvatures, 1.0) <= bounds)
     flat_enough = merits.new_tensor([_is_flat(course, settings.merit_tolerance) for course in state.courses]) > 0.0
     lost = layout.member_largest(_lost(state).to(merits)) > 0.0
-    answer: list[bool] = ((promises_nothing | (curved & flat_enough)) & ~lost).tolist()
-    return answer
+    answers: list[bool] = ((promises_nothing | (curved & flat_enough)) & ~lost).tolist()
+    return [answer and number not in singular for number, answer in enumerate(answers)]
 
 
 def _lost(state: ProjectionState) -> Tensor:
@@ -65,11 +65,17 @@ def _lost(state: ProjectionState) -> Tensor:
     return (system.diagonal == 0.0) & (state.linearised.stiffness > 0.0) & (system.structure.scatter(residuals) > 0.0)
 
 
-def _undamped(problem: Problem, state: ProjectionState, damping: Tensor) -> Proposal:
-    accuracy, at = tightest_accuracy(state.settings), state.linearised
-    if at.inequalities is None:
-        return Proposal.of(at.system, problem.solver, damping, accuracy)
-    return at.inequalities.propose(problem.solver, damping, state.heeded, accuracy)
+def _undamped(problem: Problem, state: ProjectionState) -> tuple[Proposal | None, set[int]]:
+    """The step with as good as no damping, and the members without one, since their part of the system is singular."""
+    singular = set(state.singular)
+    while len(singular) < problem.layout.members:
+        at = state.linearised.without(singular)
+        damping = _PROBE * torch.where(at.system.diagonal > 0.0, at.system.diagonal, 1.0)
+        try:
+            return at.propose(problem.solver, damping, state.heeded, tightest_accuracy(state.settings)), singular
+        except SingularSystemError as error:
+            singular |= culprits(error, at.system, singular)
+    return None, singular
 
 
 def _curvatures(problem: Problem, flat: Tensor, step: Tensor, merits: Tensor) -> Tensor:

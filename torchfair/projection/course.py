@@ -99,23 +99,28 @@ class Course:
             settings: Tolerances.
             inexact: Whether the linear solver is only as accurate as asked for.
         """
-        tried = replace(self, iteration=self.iteration + 1, last=outcome)
+        iteration = self.iteration + 1
         if not outcome.accepted:
             damping = outcome.damping.rejected()
             suspected = damping.exhausted or (outcome.short and not self.doubted)
-            return replace(
-                tried,
-                damping=damping,
+            return Course(
+                self.standing,
+                damping,
+                self.accuracy,
+                iteration,
+                self.falls,
+                outcome,
                 suspicion=Status.STEP_TOLERANCE if suspected else None,
                 doubted=self.doubted or suspected,
             )
         fall = (self.merit - standing.merit) / self.merit
-        moved = replace(
-            tried,
-            standing=standing,
-            damping=outcome.damping.accepted(outcome.gain),
-            falls=(*self.falls, fall)[-settings.patience_when_damped * settings.patience :],
-            doubted=False,
+        moved = Course(
+            standing,
+            outcome.damping.accepted(outcome.gain),
+            self.accuracy,
+            iteration,
+            (*self.falls, fall)[-settings.patience_when_damped * settings.patience :],
+            outcome,
         )
         if outcome.short:
             return replace(moved, suspicion=Status.STEP_TOLERANCE)

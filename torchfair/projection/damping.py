@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 LARGEST = 1e20
 SMALLEST = 1e-60  # from far starts the largest stiffness met is many powers of ten above that at the minimum
@@ -27,7 +27,7 @@ class Damping:
 
     def rejected(self) -> Damping:
         """After a rejected step or a singular system."""
-        return replace(self, value=self.value * self.growth, growth=2.0 * self.growth)
+        return Damping(self.value * self.growth, 2.0 * self.growth)
 
     @property
     def exhausted(self) -> bool:

@@ -99,8 +99,9 @@ class GuidedProjection(Problem):
 
         The members share terms and fixed unknowns. They are solved as one system with their block structure, which is
         many times as fast as one after the other where they are small. Damping, acceptance and convergence are those of
-        each member, so results are the same up to rounding; only a singular system raises the damping of all, and ends
-        all if it stays singular.
+        each member, so results are the same up to rounding. A member whose part of the system is singular gets more
+        damping, and ends alone if it stays singular; an iterative solver or one of your own that cannot name the member
+        raises the damping of all, unless a derivative that is not finite tells which one it is.
 
         Raises:
             ShapeError: blocks are not ``(batch, n, d)`` of the sizes compiled for.

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
 from ..linear import LinearSolver
+from .linear_system import LinearSystem
 from .loss import is_one_sided
 from .proposal import Proposal
-from .system import LinearSystem, Structure
+from .system import Structure
 
 _MOST_SOLVES = 6
 _ENOUGH = 0.1  # of the fall of the model: cost of inequalities wrongly heeded or ignored that is worth a solve
@@ -54,9 +56,17 @@ class Inequalities:
             jacobians[number] = jacobians[number] * chosen[:, None]
         return LinearSystem(whole.structure, jacobians, residuals, whole.roots, whole.affine_residual)
 
+    def without(self, members: Collection[int]) -> Inequalities:
+        """The same without some members of a batch, see :meth:`LinearSystem.without`."""
+        return Inequalities(self._whole.without(members), self._numbers)
+
     def chosen_members(self, heeded: Tensor, chosen: list[int]) -> Tensor:
-        """(n',) the inequalities heeded of some of the members of a batch alone."""
-        return heeded[self._rows.are_among(chosen)]
+        """(n',) the inequalities heeded of some of the members of a batch alone, in the order of ``chosen``."""
+        shapes = [self._whole.residuals[number].shape for number in self._numbers]
+        parts = zip(torch.split(heeded, [shape.numel() for shape in shapes]), shapes, strict=True)
+        count = self._whole.structure.layout.members
+        views = [part.view(shape[0], count, shape[1] // count) for part, shape in parts]
+        return torch.cat([view[:, chosen].reshape(-1) for view in views])
 
     def propose(self, solver: LinearSolver, damping: Tensor, likely: Tensor | None, accuracy: float) -> Proposal:
         """The step that minimises the merit of linearised residuals, plus damping.
@@ -110,10 +120,6 @@ class _Members:
             equations = [owner for number, owner in enumerate(owners) if number not in numbers]
             self._equations = _flat([*equations, *affine], every)
             self._inequalities = _flat([owners[number] for number in numbers])
-
-    def are_among(self, chosen: list[int]) -> Tensor:
-        """(n,) bool: inequalities of the chosen members."""
-        return torch.isin(self._inequalities, torch.tensor(chosen, device=self._inequalities.device))
 
     def sums(self, unknowns: Tensor, equations: Tensor, inequalities: Tensor) -> Tensor:
         """(members,) sums over all three."""

@@ -83,10 +83,12 @@ class Layout:
         """Blocks as one vector."""
         return torch.cat([state[name].reshape(-1) for name in self.sizes])
 
-    def unflatten(self, flat: Tensor) -> dict[str, Tensor]:
-        """One vector as blocks (views)."""
-        parts = torch.split(flat, [n * d for n, d in self.sizes.values()])
-        return {name: part.view(n, d) for (name, (n, d)), part in zip(self.sizes.items(), parts, strict=True)}
+    def unflatten(self, flat: Tensor, members: int | None = None) -> dict[str, Tensor]:
+        """One vector as blocks (views); a vector of another number of members, if that is given."""
+        count = self.members if members is None else members
+        sizes = {name: (n // self.members * count, d) for name, (n, d) in self.sizes.items()}
+        parts = torch.split(flat, [n * d for n, d in sizes.values()])
+        return {name: part.view(size) for (name, size), part in zip(sizes.items(), parts, strict=True)}
 
     def member_sums(self, flat: Tensor) -> Tensor:
         """(members,) sums of a flat vector over the unknowns of each member."""

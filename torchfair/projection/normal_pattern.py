@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -159,6 +159,17 @@ class NormalPattern:
         """(nnz,) values of the lower triangle for element Jacobians ``(m, K, n)`` of the terms."""
         values = self._like.new_zeros(self.lower.rows.size) if self._products is None else self._products(jacobians)
         return values if self._constant is None else values.add_(self._constant)
+
+    def repeated_sum(self, count: int) -> Callable[[Sequence[Tensor]], Tensor]:
+        """:meth:`assemble` for ``count`` members at once, see :meth:`ProductSum.repeated`; values (nnz, count)."""
+        products = None if self._products is None else self._products.repeated(count)
+
+        def assemble(jacobians: Sequence[Tensor]) -> Tensor:
+            shape = (self.lower.rows.size, count)
+            values = self._like.new_zeros(shape) if products is None else products(jacobians).view(shape)
+            return values if self._constant is None else values.add_(self._constant[:, None])
+
+        return assemble
 
 
 def _place(start: Ints, stride: Ints, i: Ints | int, j: Ints | int) -> Ints:

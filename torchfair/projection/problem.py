@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError
-from ..linear import BlockDense, LinearSolver, choose_solver
+from ..linear import BlockByBlock, BlockDense, LinearSolver, SparseDirect, choose_solver
 from .checks import listed
 from .layout import Layout, State
 from .replicate import replicated
@@ -107,8 +107,8 @@ class Problem:
     def batched(self, count: int) -> Problem:
         """The problems of ``count`` members with the same terms as one, see :class:`Layout`; kept for the next time.
 
-        Small members have a dense solver of their own each, unless this problem has an iterative one; larger ones have
-        the same solver for all together.
+        Small members have dense factors each, unless this problem has an iterative solver; larger ones have its sparse
+        direct solver each, with one analysis for all, or its other solver for all together.
         """
         known = self._others.get(count)
         if known is None:
@@ -123,9 +123,8 @@ class Problem:
         result.terms = [replicated(term, self.layout, count) for term in self.terms]
         parts = self.layout.unflatten(self.structure.free)
         free = torch.cat([part.repeat(count, 1).flatten() for part in parts.values()])
-        result.structure = Structure(result.layout, result.terms, free, self.layout.dtype)
-        small = self.layout.num_unknowns <= _SMALL and not self.solver.inexact
-        result.solver = BlockDense(result.layout.member_unknowns()) if small else copy.copy(self.solver)
+        result.structure = Structure(result.layout, result.terms, free, self.layout.dtype, self.structure)
+        result.solver = _for_members(self.solver, result.layout.member_unknowns())
         return result
 
     def check_blocks(self, blocks: State) -> None:
@@ -137,3 +136,12 @@ class Problem:
     def prepare(self) -> None:
         """Symbolic analysis; costs nothing where it is known."""
         self.solver.prepare(self.structure)
+
+
+def _for_members(solver: LinearSolver, unknowns: Tensor) -> LinearSolver:
+    """The solver for a batch whose members have the unknowns (members, n)."""
+    if unknowns.shape[1] <= _SMALL and not solver.inexact:
+        return BlockDense(unknowns)
+    if isinstance(solver, SparseDirect):
+        return BlockByBlock(unknowns, solver)
+    return copy.copy(solver)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import torch
@@ -37,15 +38,27 @@ class ProductSum:
             parts = [torch.ones(s) if f is None else f for s, f in zip(self._shapes, factors, strict=True)]
             weights = torch.cat([part.reshape(-1).to(like) for part in parts])
         self._matrix = scatter_matrix(index, size, like.dtype, weights)
+        self._count, self._weighted = 1, weights is not None
         # Kept between calls: at this size, fresh memory costs more than the arithmetic.
         self._products = like.new_empty(index.shape[0])
+
+    def repeated(self, count: int) -> ProductSum:
+        """The same for members with equal elements.
+
+        Takes Jacobians ``(m, K, n * count)``, the members of an element one after the other; returns ``(size, count)``.
+        """
+        result = copy.copy(self)
+        result._count = count
+        result._products = self._products.new_empty(self._products.shape[0] // self._count * count)
+        return result
 
     def __call__(self, jacobians: Sequence[Tensor]) -> Tensor:
         """(size,) sums for element Jacobians ``(m, K, n)``."""
         start = 0
         for firsts, shape, jacobian in zip(self._firsts, self._shapes, jacobians, strict=True):
-            products = self._products[start : start + shape.numel()].view(shape)
-            start += shape.numel()
+            stop = start + shape.numel() * self._count
+            products = self._products[start:stop].view(shape[0], shape[1] * self._count)
+            start = stop
             row = 0
             for p, first in enumerate(firsts):
                 out = products[row : row + p + 1 - first]
@@ -53,5 +66,15 @@ class ProductSum:
                 for component in jacobian[1:]:
                     out.addcmul_(component[p], component[first : p + 1])
                 row += p + 1 - first
-        total: Tensor = self._matrix @ self._products
-        return total
+        if self._count == 1:
+            total: Tensor = self._matrix @ self._products
+            return total
+        # Several times as fast as the product of the sparse matrix with a dense one.
+        return torch.nn.functional.embedding_bag(
+            self._matrix.col_indices(),
+            self._products.view(-1, self._count),
+            self._matrix.crow_indices(),
+            mode="sum",
+            per_sample_weights=self._matrix.values() if self._weighted else None,
+            include_last_offset=True,
+        )

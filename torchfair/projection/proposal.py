@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from ..linear import Factor, LinearSolver
-from .system import Evaluation, LinearSystem
+from .linear_system import LinearSystem
+from .system import Evaluation
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,7 @@ class Proposal:
         system, factor: The last system that was solved for the step, and its damped matrix.
         damping: (N,) its diagonal.
         heeded: Inequalities that the system takes for equations, if there are any.
+        lost: Members whose own part of the system is singular: they are left out of it and do not move.
     """
 
     change: Tensor
@@ -30,6 +32,7 @@ class Proposal:
     factor: Factor
     damping: Tensor
     heeded: Tensor | None = None
+    lost: frozenset[int] = frozenset()
 
     @classmethod
     def of(cls, system: LinearSystem, solver: LinearSolver, damping: Tensor, accuracy: float) -> Proposal:

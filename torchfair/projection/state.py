@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 from torch import Tensor
 
+from ..linear import LinearSolver
 from .course import Course
 from .inequalities import Inequalities
+from .linear_system import LinearSystem
+from .proposal import Proposal
+from .result import Status
 from .settings import ProjectionSettings
-from .system import Evaluation, LinearSystem
+from .system import Evaluation
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,19 @@ class Linearised:
     system: LinearSystem
     inequalities: Inequalities | None
     stiffness: Tensor
+
+    def without(self, members: Collection[int]) -> Linearised:
+        """The same without some members of a batch, see :meth:`LinearSystem.without`."""
+        if not members:
+            return self
+        inequalities = None if self.inequalities is None else self.inequalities.without(members)
+        return replace(self, system=self.system.without(members), inequalities=inequalities)
+
+    def propose(self, solver: LinearSolver, damping: Tensor, likely: Tensor | None, accuracy: float) -> Proposal:
+        """The damped step; see :meth:`Proposal.of` and :meth:`Inequalities.propose`."""
+        if self.inequalities is None:
+            return Proposal.of(self.system, solver, damping, accuracy)
+        return self.inequalities.propose(solver, damping, likely, accuracy)
 
 
 @dataclass(frozen=True)
@@ -44,6 +62,11 @@ class ProjectionState:
     settings: ProjectionSettings
     courses: tuple[Course, ...]
     heeded: Tensor | None = None
+
+    @property
+    def singular(self) -> frozenset[int]:
+        """Members that have ended because their part of the system is singular."""
+        return frozenset(n for n, course in enumerate(self.courses) if course.status is Status.SINGULAR)
 
     @property
     def blocks(self) -> dict[str, Tensor]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar, cast
@@ -12,9 +12,10 @@ import torch
 from torch import Tensor
 
 from .._threads import threads_for
-from ..errors import SettingsError, SingularSystemError
+from ..errors import SettingsError
 from .certificate import certified
 from .course import Course, Outcome, Standing
+from .damped_solution import numbers, propose
 from .damping import Damping
 from .evaluate import check_linearised, check_start
 from .inequalities import Inequalities
@@ -152,9 +153,14 @@ def step(
     watch, settings = Stopwatch(), state.settings
     problem.prepare()
     with watch.part("solve"):
-        proposal, dampings = _propose(problem, state)
+        proposal, dampings = propose(problem, state)
     if proposal is None:
-        return _singular(state, dampings, watch)
+        ended = tuple(
+            course if course.finished(settings) else _singular(course, damping)
+            for course, damping in zip(state.courses, dampings, strict=True)
+        )
+        after = replace(state, courses=ended)
+        return after, record_of(after, timings=watch.parts)
     trials = Trials(problem, state, proposal, guard, watch)
     _try(trials, proposal, state)
     best = trials.best()
@@ -163,14 +169,13 @@ def step(
         with watch.part("linearise"):
             linearised, standings = _linearise(problem, best, settings, state.linearised.stiffness)
     outcomes = map(Outcome, dampings, trials.gains, *trials.sizes(), trials.taken)
-    courses = tuple(
-        course
-        if course.finished(settings)
-        else course.after(outcome, standing, settings, inexact=problem.solver.inexact)
-        for course, outcome, standing in zip(state.courses, outcomes, standings, strict=True)
-    )
+    courses = [
+        _after(course, outcome, standing, settings, inexact=problem.solver.inexact, lost=number in proposal.lost)
+        for number, (course, outcome, standing) in enumerate(zip(state.courses, outcomes, standings, strict=True))
+    ]
     evaluation = best or state.evaluation
-    after = replace(state, evaluation=evaluation, linearised=linearised, courses=courses, heeded=proposal.heeded)
+    after = replace(state, evaluation=evaluation, linearised=linearised, courses=tuple(courses))
+    after = replace(after, heeded=proposal.heeded)
     with watch.part("solve"):
         after = _judged(problem, after)
     return after, record_of(after, inner_iterations=proposal.iterations, timings=watch.parts)
@@ -204,19 +209,6 @@ def _linearise(
     return Linearised(system, inequalities, stiffest), [Standing(*row) for row in numbers]
 
 
-def _damping(problem: Problem, state: ProjectionState, dampings: Sequence[Damping]) -> Tensor:
-    """(N,) the diagonal to be added; one where nothing is felt."""
-    stiffness = state.linearised.stiffness
-    values = problem.layout.member_spread(_numbers([damping.value for damping in dampings], stiffness))
-    scaled = values if state.settings.damping_scale == "identity" else values * stiffness
-    return torch.where(stiffness > 0.0, scaled.clamp_min(torch.finfo(scaled.dtype).tiny), 1.0)
-
-
-def _numbers(values: Sequence[float], like: Tensor) -> Tensor:
-    """(members,) numbers; a single one needs no copy to another device."""
-    return like.new_full((1,), values[0]) if len(values) == 1 else like.new_tensor(values)
-
-
 def _judged(problem: Problem, state: ProjectionState) -> ProjectionState:
     """Members that are suspected to be at a minimum either are there, or go on."""
     if not any(course.suspicion for course in state.courses):
@@ -232,20 +224,6 @@ def _judged(problem: Problem, state: ProjectionState) -> ProjectionState:
         for course, answer in zip(state.courses, answers, strict=True)
     ]
     return replace(state, courses=tuple(courses))
-
-
-def _propose(problem: Problem, state: ProjectionState) -> tuple[Proposal | None, list[Damping]]:
-    """A solution of the damped system, None where it is singular at every damping; and the damping it needed."""
-    dampings, at = [course.damping for course in state.courses], state.linearised
-    while not all(damping.exhausted for damping in dampings):
-        diagonal = _damping(problem, state, dampings)
-        try:
-            if at.inequalities is None:
-                return Proposal.of(at.system, problem.solver, diagonal, state.accuracy), dampings
-            return at.inequalities.propose(problem.solver, diagonal, state.heeded, state.accuracy), dampings
-        except SingularSystemError:
-            dampings = [damping.rejected() for damping in dampings]
-    return None, dampings
 
 
 def _try(trials: Trials, proposal: Proposal, state: ProjectionState) -> None:
@@ -265,7 +243,7 @@ def _try(trials: Trials, proposal: Proposal, state: ProjectionState) -> None:
     factors = [_extrapolation(gain) for gain in trials.gains]
     longer = [factor > settings.least_extrapolation for factor in factors]
     if any(longer):
-        spread = proposal.system.structure.layout.member_spread(_numbers(factors, change))
+        spread = proposal.system.structure.layout.member_spread(numbers(factors, change))
         trials.offer(spread * change, longer, again=True)
 
 
@@ -274,15 +252,20 @@ def _extrapolation(gain: float) -> float:
     return min(1.0 / (2.0 - gain), _LONGEST_EXTRAPOLATION) if gain < 2.0 else _LONGEST_EXTRAPOLATION
 
 
-def _singular(
-    state: ProjectionState, dampings: Sequence[Damping], watch: Stopwatch
-) -> tuple[ProjectionState, IterationRecord]:
-    courses = []
-    for course, damping in zip(state.courses, dampings, strict=True):
-        last = Outcome(damping, -math.inf, 0.0, False, False)
-        courses.append(replace(course, iteration=course.iteration + 1, last=last, status=Status.SINGULAR))
-    after = replace(state, courses=tuple(courses))
-    return after, record_of(after, inner_iterations=0, timings=watch.parts)
+def _after(
+    course: Course, outcome: Outcome, standing: Standing, settings: ProjectionSettings, *, inexact: bool, lost: bool
+) -> Course:
+    if course.finished(settings):
+        return course
+    if lost:
+        return _singular(course, outcome.damping)
+    return course.after(outcome, standing, settings, inexact=inexact)
+
+
+def _singular(course: Course, damping: Damping) -> Course:
+    """One for which no damping is enough."""
+    last = Outcome(damping, -math.inf, 0.0, False, False)
+    return replace(course, iteration=course.iteration + 1, last=last, status=Status.SINGULAR)
 
 
 def record_of(

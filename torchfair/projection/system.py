@@ -1,4 +1,4 @@
-"""The linearised problem: element Jacobians, and what linear solvers need of them."""
+"""A compiled problem: numbering, sparsity, evaluation and linearisation."""
 
 from __future__ import annotations
 
@@ -12,14 +12,16 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from ..linear import LowerTriangle
-from ..linear.block_inverse import block_inverse
 from ..linear.sparse import scatter_matrix
 from .affine import AffinePart
 from .block_diagonal import BlockDiagonal
 from .compiled import CompiledTerm
 from .layout import Layout, State
+from .linear_system import LinearSystem
 from .loss import apply_root
 from .normal_pattern import NormalPattern
+from .repeated_pattern import RepeatedPattern
+from .replicate import first_members
 from .row_pattern import RowPattern
 from .term import ElementTerm
 
@@ -50,10 +52,20 @@ class Structure:
         compiled: Those of them that are not linear.
         affine: The linear ones, None if there are none.
         free: (N,) unknowns that may move.
+
+    Args:
+        single: In a batch, the structure of one member.
     """
 
-    def __init__(self, layout: Layout, terms: Sequence[ElementTerm], free: Tensor, dtype: torch.dtype) -> None:
-        self.layout, self.free = layout, free
+    def __init__(
+        self,
+        layout: Layout,
+        terms: Sequence[ElementTerm],
+        free: Tensor,
+        dtype: torch.dtype,
+        single: Structure | None = None,
+    ) -> None:
+        self.layout, self.free, self._single = layout, free, single
         self._take([CompiledTerm(term, layout) for term in self._checked(terms)], dtype)
         self._like = torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device)
         self._mask()
@@ -86,9 +98,10 @@ class Structure:
         result = copy.copy(self)
         for stale in ("normal_pattern", "block_diagonal", "_outputs"):
             result.__dict__.pop(stale, None)
+        result._single = None
         result._take(compiled, self._like.dtype)
         pattern = self.__dict__.get("normal_pattern")
-        if pattern is not None and pattern.fits(result.affine):
+        if isinstance(pattern, NormalPattern) and pattern.fits(result.affine):
             result.__dict__["normal_pattern"] = pattern.with_constant(result.affine)
         return result
 
@@ -145,8 +158,11 @@ class Structure:
         return torch.stack([self._like.new_zeros(members), *parts]).sum(0)
 
     @cached_property
-    def normal_pattern(self) -> NormalPattern:
+    def normal_pattern(self) -> NormalPattern | RepeatedPattern:
         """Sparsity of the normal matrix and the map into it."""
+        single = None if self._single is None else self._single.normal_pattern
+        if isinstance(single, NormalPattern):
+            return RepeatedPattern(single, self.layout)
         return NormalPattern(self.layout, self.compiled, self.affine, self._like)
 
     @cached_property
@@ -163,19 +179,69 @@ class Structure:
 
     def evaluate(self, state: State) -> Evaluation:
         """Residuals and merit of a state."""
-        arguments, values, parts = [], [], [self._like.new_zeros(self.layout.members)]
-        for term in (compiled.term for compiled in self.compiled):
+        affine = None if self.affine is None else self.affine.residual(self.layout.flatten(state))
+        return self._evaluated(state, [compiled.term for compiled in self.compiled], self.layout.members, affine)
+
+    def evaluate_members(self, flat: Tensor, chosen: list[int]) -> Evaluation:
+        """Residuals and merits of some members of a batch alone; those of linear terms for all of them.
+
+        Args:
+            flat: (N,) the state of all members.
+            chosen: Numbers of members.
+        """
+        blocks = self.layout.unflatten(self.layout.chosen_members(flat, chosen), len(chosen))
+        affine = None if self.affine is None else self.affine.residual(flat)
+        terms = [first_members(c.term, c.term.num_elements // self.layout.members * len(chosen)) for c in self.compiled]
+        return self._evaluated(blocks, terms, len(chosen), affine, chosen)
+
+    def _evaluated(
+        self,
+        state: State,
+        terms: Sequence[ElementTerm],
+        count: int,
+        affine: Tensor | None,
+        chosen: list[int] | None = None,
+    ) -> Evaluation:
+        arguments, values, parts = [], [], [self._like.new_zeros(count)]
+        for term in terms:
             arguments.append(term.arguments(state))
             values.append(term.values(arguments[-1]))
             contributions = term.contributions(arguments[-1], values[-1])
-            parts.append(contributions.view(self.layout.members, -1).sum(1).to(self._like))
-        affine = None
-        if self.affine is not None:
-            affine = self.affine.residual(self.layout.flatten(state))
-            parts.append(0.5 * self.affine.member_sums(affine.square(), self.layout.members))
+            parts.append(contributions.view(count, -1).sum(1).to(self._like))
+        if self.affine is not None and affine is not None:
+            own = 0.5 * self.affine.member_sums(affine.square(), self.layout.members)
+            parts.append(own if chosen is None else own[chosen])
         merits = torch.stack(parts).sum(0)
         merits = torch.where(torch.isfinite(merits), merits, torch.inf)
         return Evaluation(state, merits, arguments, values, affine)
+
+    def with_members(
+        self, at: Evaluation, flat: Tensor, part: Evaluation, chosen: list[int], rows: list[int]
+    ) -> Evaluation:
+        """An evaluation in which some members have another state.
+
+        Args:
+            at: Of all members.
+            flat: (N,) the new state of all.
+            part: Of these members, or of more.
+            chosen: Their numbers.
+            rows: Their places in ``part``.
+        """
+        members, places, sources = self.layout.members, torch.tensor(chosen), torch.tensor(rows)
+        places, sources = places.to(self.device), sources.to(self.device)
+
+        def mixed(old: Tensor, new: Tensor) -> Tensor:
+            size = old.shape[0] // members
+            result = old.clone()
+            result.view(members, size, *old.shape[1:])[places] = new.view(-1, size, *old.shape[1:])[sources]
+            return result
+
+        arguments = [tuple(map(mixed, *pair)) for pair in zip(at.arguments, part.arguments, strict=True)]
+        values = [mixed(*pair) for pair in zip(at.values, part.values, strict=True)]
+        affine = None
+        if self.affine is not None and at.affine is not None and part.affine is not None:
+            affine = self.affine.with_members(at.affine, part.affine, places, members)
+        return Evaluation(self.layout.unflatten(flat), mixed(at.merits, part.merits), arguments, values, affine)
 
     def unknowns_of_infinite_elements(self, at: Evaluation) -> Tensor:
         """(N,) bool: unknowns of elements whose share of the merit is not finite."""
@@ -197,143 +263,9 @@ class Structure:
         return LinearSystem(self, jacobians, residuals, roots, at.affine)
 
 
-class LinearSystem:
-    """``J`` and ``r`` of the quadratic model ``|r + J d|^2 / 2`` at one state.
-
-    Fixed unknowns have zero columns in ``J``: without damping the normal matrix is singular there.
-
-    Attributes:
-        jacobians: for each term of ``Structure.compiled`` ``(m, K, n)``, unknowns as in ``CompiledTerm``.
-        residuals: likewise ``(m, n)``.
-        roots: square roots of the weights that both are scaled by, see ``ElementTerm.roots``.
-        affine_residual: of the linear terms.
-    """
-
-    def __init__(
-        self,
-        structure: Structure,
-        jacobians: list[Tensor],
-        residuals: list[Tensor],
-        roots: list[Tensor],
-        affine_residual: Tensor | None,
-    ) -> None:
-        self.structure = structure
-        self.jacobians = jacobians
-        self.residuals = residuals
-        self.roots = roots
-        self.affine_residual = affine_residual
-
-    @cached_property
-    def gradient(self) -> Tensor:
-        """``J^T r``, the gradient of the merit."""
-        return self._pulled_back(self.residuals, self.affine_residual)
-
-    def gradient_with(self, other: Evaluation) -> Tensor:
-        """``J^T r`` with the residuals of another state, in the weights of this one."""
-        residuals = [apply_root(root, values).T for root, values in zip(self.roots, other.values, strict=True)]
-        return self._pulled_back(residuals, other.affine)
-
-    def _pulled_back(self, residuals: Sequence[Tensor], affine: Tensor | None) -> Tensor:
-        total = self.structure.scatter([_contract(j, r) for j, r in zip(self.jacobians, residuals, strict=True)])
-        if self.structure.affine is not None and affine is not None:
-            total += self.structure.affine.gradient(affine)
-        return total
-
-    def changes(self, step: Tensor) -> tuple[list[Tensor], Tensor | None]:
-        """By how much a step (N,) changes the residuals of the model: of each term (m, n), and of the linear terms."""
-        terms = [
-            torch.einsum("mkn,kn->mn", jacobian, step[compiled.unknowns])
-            for compiled, jacobian in zip(self.structure.compiled, self.jacobians, strict=True)
-        ]
-        return terms, None if self.structure.affine is None else self.structure.affine.change(step)
-
-    def predicted_fall(self, step: Tensor) -> Tensor:
-        """(members,) by how much the merit of the linearised residuals falls with a step (N,)."""
-        structure = self.structure
-        members = structure.layout.members
-        total = -structure.layout.member_sums(step * self.gradient)
-        terms, affine = self.changes(step)
-        total -= 0.5 * structure.member_sums([change.square() for change in terms])
-        if affine is not None and structure.affine is not None:
-            total -= 0.5 * structure.affine.member_sums(affine.square(), members)
-        return total
-
-    @cached_property
-    def diagonal(self) -> Tensor:
-        """Diagonal of ``J^T J``; zero at fixed unknowns and at unknowns that no term feels.
-
-        Used for scaling only: where an element names a node twice, the mixed products are left out, here
-        and in :attr:`diagonal_blocks`.
-        """
-        total = self.structure.scatter([_contract(j, j) for j in self.jacobians])
-        return total if self.structure.affine is None else total + self.structure.affine.diagonal
-
-    @cached_property
-    def diagonal_blocks(self) -> dict[str, Tensor]:
-        """Diagonal blocks ``(n, d, d)`` of ``J^T J``, by block of variables."""
-        diagonal = self.structure.block_diagonal
-        return diagonal.split(diagonal.values(self.jacobians))
-
-    @cached_property
-    def _matrices(self) -> tuple[Tensor, Tensor]:
-        return self.structure.row_pattern(tuple(j.shape[0] for j in self.jacobians)).matrices(self.jacobians)
-
-    @property
-    def jacobian(self) -> Tensor:
-        """``J`` as a CSR matrix."""
-        return self._matrices[0]
-
-    @property
-    def jacobian_transpose(self) -> Tensor:
-        """``J^T`` as a CSR matrix."""
-        return self._matrices[1]
-
-    @cached_property
-    def residual_vector(self) -> Tensor:
-        """``r`` in the row order of :attr:`jacobian`."""
-        parts = [r.reshape(-1) for r in self.residuals]
-        return torch.cat(parts if self.affine_residual is None else [*parts, self.affine_residual])
-
-    @property
-    def pattern(self) -> Structure:
-        """Where the normal matrix has entries."""
-        return self.structure
-
-    @property
-    def root(self) -> Tensor:
-        """``J``, the root of the normal matrix."""
-        return self.jacobian
-
-    def product(self, vectors: Tensor) -> Tensor:
-        """``J^T J`` times vectors (N,) or (N, k)."""
-        result: Tensor = self.jacobian_transpose @ (self.jacobian @ vectors)
-        return result
-
-    def preconditioner(self, damping: Tensor) -> Tensor:
-        """Inverse of the damped diagonal blocks, as a CSR matrix."""
-        parts = self.structure.layout.unflatten(damping)
-        inverses = [
-            block_inverse(block + torch.diag_embed(parts[name])) for name, block in self.diagonal_blocks.items()
-        ]
-        return self.structure.block_diagonal.matrix(torch.cat([inverse.reshape(-1) for inverse in inverses]))
-
-    @cached_property
-    def lower_values(self) -> Tensor:
-        """Values of the lower triangle of ``J^T J`` in the order of the normal pattern."""
-        return self.structure.normal_pattern.assemble(self.jacobians)
-
-
 def _scaled(jacobians: Tensor, root: Tensor) -> Tensor:
     """Jacobians (n, m, K) times their roots, as (m, K, n)."""
     if root.ndim == 3:
         return torch.bmm(root, jacobians.contiguous()).permute(1, 2, 0).contiguous()
     local = jacobians.permute(1, 2, 0)
     return torch.mul(local, root, out=torch.empty_like(local, memory_format=torch.contiguous_format))
-
-
-def _contract(jacobian: Tensor, other: Tensor) -> Tensor:
-    """(K, n) sum over components of ``jacobian`` (m, K, n) times ``other`` (m, n) or (m, K, n)."""
-    total = jacobian[0] * other[0]
-    for row, factor in zip(jacobian[1:], other[1:], strict=True):
-        total.addcmul_(row, factor)
-    return total

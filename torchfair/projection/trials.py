@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -19,6 +20,7 @@ Guard = Callable[[State, State], bool]
 
 LEAST_GAIN = 1e-4  # of the predicted fall of the merit, for a step to be taken
 _ROUNDING = 2.0**-51  # falls below this fraction of the merit cannot be computed
+_FEW = 0.75  # share of members up to which it pays to evaluate them alone
 _HALVINGS = 6  # of the step of unknowns whose elements leave their domain
 
 
@@ -43,11 +45,13 @@ class Trials:
         self._problem, self._state, self._proposal = problem, state, proposal
         self._guard, self._watch = guard, watch
         self._start = problem.layout.flatten(state.evaluation.state)
-        self._active = [course.finished(state.settings) is None for course in state.courses]
-        self._lost = [False for _ in state.courses]  # members whose step leads nowhere finite, in this attempt
-        self._best: Evaluation | None = None
-        self._change = torch.zeros_like(self._start)
-        self._mixed = False
+        self._active = [
+            number
+            for number, course in enumerate(state.courses)
+            if course.finished(state.settings) is None and number not in proposal.lost
+        ]
+        self._promised: list[float] = proposal.predicted.tolist()
+        self._best, self._change = state.evaluation, torch.zeros_like(self._start)
         self.merits = [course.merit for course in state.courses]
         self.gains = [-math.inf for _ in state.courses]
 
@@ -56,32 +60,49 @@ class Trials:
 
         Args:
             change: The step. Where it leads to residuals that are not finite, it is shortened.
-            to: Members that may take it, by default all.
+            to: Members that may take it, by default all; no others are evaluated where that saves time.
             again: The gain of the first attempt stays what counts.
 
         Returns:
-            The state after the step, also where it is not taken; None if it is finite for no member.
+            The state of all members after the step, also where it is not taken; None if it is finite for no member, or
+            was not tried by all.
         """
-        trial, change, merits, promised = self._finite(change)
-        if trial is None:
+        asked = [number for number in self._active if to is None or to[number]]
+        if not asked:
             return None
-        gains, takes = [], []
-        for number, course in enumerate(self._state.courses):
-            asked = self._active[number] and not self._lost[number] and (to is None or to[number])
-            fall = course.merit - merits[number]
-            gains.append(fall / promised[number] if asked and promised[number] > 0.0 else -math.inf)
-            takes.append(gains[number] > LEAST_GAIN and fall > 0.0 and merits[number] < self.merits[number])
-        if any(takes) and not self._admits(trial.state):
-            return trial
+        count = len(self.merits)
+        few = to is not None and self._guard is None and len(asked) <= _FEW * count
+        tried = self._finite(change, asked if few else range(count))
+        if tried is None:
+            return None
+        whole = tried.trial if len(tried.seen) == count else None
+        gains, takes, rows = [-math.inf] * count, [], {number: row for row, number in enumerate(tried.seen)}
+        for number in asked:
+            merit, promised = tried.merits[rows[number]], tried.promised[number]
+            fall = self._state.courses[number].merit - merit
+            gains[number] = fall / promised if promised > 0.0 else -math.inf
+            if gains[number] > LEAST_GAIN and fall > 0.0 and merit < self.merits[number]:
+                takes.append(number)
+        if takes and not self._admits(tried.trial.state):
+            return whole
         if not again:
             self.gains = [max(pair) for pair in zip(self.gains, gains, strict=True)]
-        if all(takes):
-            self._best, self._change, self._mixed, self.merits = trial, change, False, merits
-        elif any(takes):
-            chosen = self._problem.layout.member_spread(torch.tensor(takes, device=change.device))
-            self._change, self._mixed = torch.where(chosen, change, self._change), True
-            self.merits = [new if take else old for take, new, old in zip(takes, merits, self.merits, strict=True)]
-        return trial
+        self._take(tried, takes, [rows[number] for number in takes])
+        return whole
+
+    def _take(self, tried: _Tried, takes: list[int], rows: list[int]) -> None:
+        """The members that take what was tried, and their places in it."""
+        for number, row in zip(takes, rows, strict=True):
+            self.merits[number] = tried.merits[row]
+        if len(takes) == len(self.merits):
+            self._best, self._change = tried.trial, tried.change
+        elif takes:
+            chosen = torch.zeros(len(self.merits), dtype=torch.bool)
+            chosen[takes] = True
+            spread = self._problem.layout.member_spread(chosen.to(tried.change.device))
+            self._change = torch.where(spread, tried.change, self._change)
+            flat = self._start + self._change
+            self._best = self._problem.structure.with_members(self._best, flat, tried.trial, takes, rows)
 
     def sizes(self) -> tuple[list[float], list[bool]]:
         """For each member, the largest change of an unknown, and whether the step promises nothing.
@@ -103,36 +124,53 @@ class Trials:
 
     def best(self) -> Evaluation | None:
         """The state in which every member has its best candidate; None if no member moves."""
-        return self._evaluate(self._start + self._change) if self._mixed else self._best
+        return None if self._best is self._state.evaluation else self._best
 
-    def _finite(self, change: Tensor) -> tuple[Evaluation | None, Tensor, list[float], list[float]]:
-        """The state after a step, the step, merits, and by how much they should have fallen.
+    def _finite(self, change: Tensor, seen: Sequence[int]) -> _Tried | None:
+        """What a step leads to; None if it is finite for no member.
 
         Where single elements are not finite, at the border of their domain, the step of their unknowns is halved, so
         that they do not stop all others.
         """
-        structure, fall = self._problem.structure, self._proposal.predicted
-        self._lost = [False for _ in self._lost]
-        for _ in range(_HALVINGS):
-            trial = self._evaluate(self._start + change)
-            merits, promised = torch.stack([trial.merits, fall]).tolist()
+        structure, system, promised = self._problem.structure, self._proposal.system, self._promised
+        every = range(len(self.merits))
+        if len(seen) < len(every):
+            trial = self._evaluate(change, seen)
+            merits = trial.merits.tolist()
             if all(map(math.isfinite, merits)):
-                return trial, change, merits, promised
+                return _Tried(trial, change, seen, merits, promised)
+        for _ in range(_HALVINGS):
+            trial = self._evaluate(change)
+            merits = trial.merits.tolist()
+            if all(map(math.isfinite, merits)):
+                return _Tried(trial, change, every, merits, promised)
             change = torch.where(structure.unknowns_of_infinite_elements(trial), 0.5 * change, change)
-            fall = self._proposal.system.predicted_fall(change)
-        self._lost = [not math.isfinite(merit) for merit in merits]
-        if all(self._lost):
-            return None, change, [], []
+            promised = system.predicted_fall(change).tolist()
+        lost = [not math.isfinite(merit) for merit in merits]
+        if all(lost):
+            return None
         # Those that are nowhere finite stay where they are; they must not stop the other members.
-        stay = torch.tensor(self._lost, device=change.device)
+        stay = torch.tensor(lost, device=change.device)
         change = torch.where(self._problem.layout.member_spread(stay), 0.0, change)
-        trial = self._evaluate(self._start + change)
-        merits, promised = torch.stack([trial.merits, self._proposal.system.predicted_fall(change)]).tolist()
-        return trial, change, merits, promised
+        trial, promised = self._evaluate(change), system.predicted_fall(change).tolist()
+        return _Tried(trial, change, every, trial.merits.tolist(), promised)
 
     def _admits(self, trial: State) -> bool:
         return self._guard is None or self._guard(self._state.evaluation.state, trial)
 
-    def _evaluate(self, flat: Tensor) -> Evaluation:
+    def _evaluate(self, change: Tensor, seen: Sequence[int] | None = None) -> Evaluation:
+        flat, structure = self._start + change, self._problem.structure
         with self._watch.part("merit"):
-            return self._problem.structure.evaluate(self._problem.layout.unflatten(flat))
+            if seen is None:
+                return structure.evaluate(self._problem.layout.unflatten(flat))
+            return structure.evaluate_members(flat, list(seen))
+
+
+class _Tried(NamedTuple):
+    """A state tried, the step to it, and of members: numbers in the state, merits there, and falls promised to all."""
+
+    trial: Evaluation
+    change: Tensor
+    seen: Sequence[int]
+    merits: list[float]
+    promised: list[float]

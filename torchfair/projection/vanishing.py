@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from .layout import State
-from .system import LinearSystem
+from .linear_system import LinearSystem
 
 
 def vanishing(system: LinearSystem, state: State, tolerance: float) -> Tensor:

@@ -1,0 +1,168 @@
+"""Residuals and Jacobians at one state, and what linear solvers need of them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+
+from ..linear.block_inverse import block_inverse
+from .loss import apply_root
+
+if TYPE_CHECKING:
+    from .system import Evaluation, Structure
+
+
+class LinearSystem:
+    """``J`` and ``r`` of the quadratic model ``|r + J d|^2 / 2`` at one state.
+
+    Fixed unknowns have zero columns in ``J``: without damping the normal matrix is singular there.
+
+    Attributes:
+        jacobians: for each term of ``Structure.compiled`` ``(m, K, n)``, unknowns as in ``CompiledTerm``.
+        residuals: likewise ``(m, n)``.
+        roots: square roots of the weights that both are scaled by, see ``ElementTerm.roots``.
+        affine_residual: of the linear terms.
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        jacobians: list[Tensor],
+        residuals: list[Tensor],
+        roots: list[Tensor],
+        affine_residual: Tensor | None,
+    ) -> None:
+        self.structure = structure
+        self.jacobians = jacobians
+        self.residuals = residuals
+        self.roots = roots
+        self.affine_residual = affine_residual
+
+    def without(self, members: Collection[int]) -> LinearSystem:
+        """The same without what some members of a batch have that is not linear: zeros there."""
+        gone = torch.zeros(self.structure.layout.members, dtype=torch.bool)
+        gone[list(members)] = True
+        gone = gone.to(self.structure.device)
+
+        def kept(part: Tensor) -> Tensor:
+            return torch.where(gone.repeat_interleave(part.shape[-1] // gone.shape[0]), 0.0, part)
+
+        roots = [kept(root.movedim(0, -1)).movedim(-1, 0) for root in self.roots]
+        return LinearSystem(
+            self.structure,
+            [kept(jacobian) for jacobian in self.jacobians],
+            [kept(residual) for residual in self.residuals],
+            roots,
+            self.affine_residual,
+        )
+
+    @cached_property
+    def gradient(self) -> Tensor:
+        """``J^T r``, the gradient of the merit."""
+        return self._pulled_back(self.residuals, self.affine_residual)
+
+    def gradient_with(self, other: Evaluation) -> Tensor:
+        """``J^T r`` with the residuals of another state, in the weights of this one."""
+        residuals = [apply_root(root, values).T for root, values in zip(self.roots, other.values, strict=True)]
+        return self._pulled_back(residuals, other.affine)
+
+    def _pulled_back(self, residuals: Sequence[Tensor], affine: Tensor | None) -> Tensor:
+        total = self.structure.scatter([_contract(j, r) for j, r in zip(self.jacobians, residuals, strict=True)])
+        if self.structure.affine is not None and affine is not None:
+            total += self.structure.affine.gradient(affine)
+        return total
+
+    def changes(self, step: Tensor) -> tuple[list[Tensor], Tensor | None]:
+        """By how much a step (N,) changes the residuals of the model: of each term (m, n), and of the linear terms."""
+        terms = [
+            torch.einsum("mkn,kn->mn", jacobian, step[compiled.unknowns])
+            for compiled, jacobian in zip(self.structure.compiled, self.jacobians, strict=True)
+        ]
+        return terms, None if self.structure.affine is None else self.structure.affine.change(step)
+
+    def predicted_fall(self, step: Tensor) -> Tensor:
+        """(members,) by how much the merit of the linearised residuals falls with a step (N,)."""
+        structure = self.structure
+        members = structure.layout.members
+        total = -structure.layout.member_sums(step * self.gradient)
+        terms, affine = self.changes(step)
+        total -= 0.5 * structure.member_sums([change.square() for change in terms])
+        if affine is not None and structure.affine is not None:
+            total -= 0.5 * structure.affine.member_sums(affine.square(), members)
+        return total
+
+    @cached_property
+    def diagonal(self) -> Tensor:
+        """Diagonal of ``J^T J``; zero at fixed unknowns and at unknowns that no term feels.
+
+        Used for scaling only: where an element names a node twice, the mixed products are left out, here
+        and in :attr:`diagonal_blocks`.
+        """
+        total = self.structure.scatter([_contract(j, j) for j in self.jacobians])
+        return total if self.structure.affine is None else total + self.structure.affine.diagonal
+
+    @cached_property
+    def diagonal_blocks(self) -> dict[str, Tensor]:
+        """Diagonal blocks ``(n, d, d)`` of ``J^T J``, by block of variables."""
+        diagonal = self.structure.block_diagonal
+        return diagonal.split(diagonal.values(self.jacobians))
+
+    @cached_property
+    def _matrices(self) -> tuple[Tensor, Tensor]:
+        return self.structure.row_pattern(tuple(j.shape[0] for j in self.jacobians)).matrices(self.jacobians)
+
+    @property
+    def jacobian(self) -> Tensor:
+        """``J`` as a CSR matrix."""
+        return self._matrices[0]
+
+    @property
+    def jacobian_transpose(self) -> Tensor:
+        """``J^T`` as a CSR matrix."""
+        return self._matrices[1]
+
+    @cached_property
+    def residual_vector(self) -> Tensor:
+        """``r`` in the row order of :attr:`jacobian`."""
+        parts = [r.reshape(-1) for r in self.residuals]
+        return torch.cat(parts if self.affine_residual is None else [*parts, self.affine_residual])
+
+    @property
+    def pattern(self) -> Structure:
+        """Where the normal matrix has entries."""
+        return self.structure
+
+    @property
+    def root(self) -> Tensor:
+        """``J``, the root of the normal matrix."""
+        return self.jacobian
+
+    def product(self, vectors: Tensor) -> Tensor:
+        """``J^T J`` times vectors (N,) or (N, k)."""
+        result: Tensor = self.jacobian_transpose @ (self.jacobian @ vectors)
+        return result
+
+    def preconditioner(self, damping: Tensor) -> Tensor:
+        """Inverse of the damped diagonal blocks, as a CSR matrix."""
+        parts = self.structure.layout.unflatten(damping)
+        inverses = [
+            block_inverse(block + torch.diag_embed(parts[name])) for name, block in self.diagonal_blocks.items()
+        ]
+        return self.structure.block_diagonal.matrix(torch.cat([inverse.reshape(-1) for inverse in inverses]))
+
+    @cached_property
+    def lower_values(self) -> Tensor:
+        """Values of the lower triangle of ``J^T J`` in the order of the normal pattern."""
+        return self.structure.normal_pattern.assemble(self.jacobians)
+
+
+def _contract(jacobian: Tensor, other: Tensor) -> Tensor:
+    """(K, n) sum over components of ``jacobian`` (m, K, n) times ``other`` (m, n) or (m, K, n)."""
+    total = jacobian[0] * other[0]
+    for row, factor in zip(jacobian[1:], other[1:], strict=True):
+        total.addcmul_(row, factor)
+    return total
