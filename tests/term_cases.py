@@ -131,6 +131,29 @@ def _(vertices: Tensor, topology: Topology) -> Case:
     return {"vertices": moved(vertices)}, c.closeness_terms(planes, chosen, weight=0.5)
 
 
+@case("Constraint.terms", triangles)
+def _(vertices: Tensor, topology: Topology) -> Case:
+    """Modules made on the CPU and moved, with everything that is refreshed."""
+    here, there = triangles(torch.device("cpu")), vertices.device
+    reference, chosen = ReferenceSurface(*here), torch.arange(0, 25, 2)
+    curves = SplineCurves([here[0][:5]], [False])
+    modules = [
+        c.Closeness(reference, chosen),
+        c.DistanceLimit(reference, torch.full_like(here[0][:, 0], 0.1)),
+        c.Gliding(curves, torch.arange(5), torch.zeros(5, dtype=torch.int64)),
+        c.GoodSaddles(*here, ~here[1].is_boundary_vertex & (here[1].valences >= 4), margin=0.01),
+        c.Handles(chosen, moved(here[0])[chosen]),
+    ]
+    terms = [term for module in modules for term in module.to(there).terms(weight=0.5)]
+    return {"vertices": moved(vertices)}, terms
+
+
+@case("flat_edge_terms", triangles, mixed)
+def _(vertices: Tensor, topology: Topology) -> Terms:
+    chosen = torch.arange(0, topology.num_interior_edges, 2, device=vertices.device)
+    return c.flat_edge_terms(topology, chosen, weight=0.5)
+
+
 @case("coplanar_terms", lattice)
 def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars) -> Case:
     return {"vertices": vertices, **c.sphere_blocks(vertices, stars)}, c.coplanar_terms(edges, stars, weight=2.0)

@@ -28,6 +28,8 @@ CPU = torch.device("cpu")
 def makers_of_terms() -> Iterator[str]:
     """Public functions, and methods of public classes, that return terms, by what they are annotated with."""
     for module in pkgutil.iter_modules(constraints.__path__):
+        if module.name.startswith("_"):
+            continue
         name = f"{constraints.__name__}.{module.name}"
         own = {k: v for k, v in vars(importlib.import_module(name)).items() if getattr(v, "__module__", None) == name}
         classes = {k: v for k, v in own.items() if inspect.isclass(v)}

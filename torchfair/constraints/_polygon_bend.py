@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import torch
@@ -22,14 +22,8 @@ class PolygonBend(NamedTuple):
 @cache
 def polygon_bend(left_size: int) -> PolygonBend:
     """The same functions every time, so that stages of a job that share a problem find what they know."""
-
-    def residual(x: Tensor) -> Tensor:
-        return polygon_pair_bend(x, left_size)
-
-    def jacobian(x: Tensor) -> Tensor:
-        return polygon_pair_bend_jacobian(x, left_size)
-
-    return PolygonBend(residual, jacobian)
+    residual = partial(polygon_pair_bend, left_size=left_size)
+    return PolygonBend(residual, partial(polygon_pair_bend_jacobian, left_size=left_size))
 
 
 def polygon_pair_bend(x: Tensor, left_size: int) -> Tensor:

@@ -12,6 +12,7 @@ from ..projection import ElementTerm
 from ..projection.nuclear_norm import SmoothNuclearNorm
 from ..projection.term import Residual
 from ..topology import Topology
+from .base import Constraint
 from .star_stencils import closed_star_stencils, open_star_stencils
 
 NAME = "absolute curvature"
@@ -45,6 +46,24 @@ def absolute_curvature_terms(
     for _, stencil in open_star_stencils(topology, bent):
         terms.append(_term(open_star, open_star_derivative, (block, stencil), weight, loss))
     return terms
+
+
+class SmoothAbsoluteCurvature(Constraint):
+    """Module form of :func:`absolute_curvature_terms`: smoothed nuclear norms of shape operators, a length.
+
+    Unchanged by rigid motions. As ``smoothing`` goes to 0 it tends to a sum over stars that is at least C, see there;
+    :class:`~torchfair.energies.TotalAbsoluteCurvature` is C itself.
+
+    Args:
+        topology: Triangle mesh.
+        smoothing: Curvature times area below which a star is treated as flat, above 0.
+
+    Raises:
+        MeshError: a face is not a triangle.
+    """
+
+    def __init__(self, topology: Topology, *, smoothing: float) -> None:
+        super().__init__(absolute_curvature_terms(topology, smoothing=smoothing))
 
 
 def _term(

@@ -22,7 +22,7 @@ def barrier(margin: Tensor, safe: Tensor) -> Tensor:
     softening = _SOFTENING * safe
     inside = torch.where(margin < 0.0, torch.zeros_like(margin), margin)
     value = (safe + softening) / (inside + softening) - 1.0
-    value = torch.where(margin < safe, value, torch.zeros_like(value))
+    value = torch.where(margin >= safe, torch.zeros_like(value), value)  # NaN does not pass for safe
     return torch.where(margin < 0.0, torch.full_like(value, torch.inf), value)
 
 

@@ -8,6 +8,7 @@ from torch.linalg import cross, vector_norm
 
 from ..projection import ElementTerm, SmoothAbsolute
 from ..topology import Topology
+from .base import Constraint
 
 NAME = "bending at the boundary"
 
@@ -42,7 +43,7 @@ def boundary_bending_terms(
     """
     corners = topology.triangles
     sides = torch.cat([corners, corners.roll(-1, 1), corners.roll(-2, 1)])
-    on_boundary = torch.isin(_keys(sides[:, :2], topology), _keys(topology.boundary_edges, topology))
+    on_boundary = torch.isin(edge_keys(sides[:, :2], topology), edge_keys(topology.boundary_edges, topology))
     total = normals[sides[:, 0]] + normals[sides[:, 1]]
     size = vector_norm(total, dim=1)
     given = (normals != 0.0).any(1)
@@ -54,6 +55,19 @@ def boundary_bending_terms(
     return [ElementTerm(NAME, boundary_bend, [(block, sides[chosen])], data=data, weight=weight, loss=loss)]
 
 
-def _keys(edges: Tensor, topology: Topology) -> Tensor:
-    """Numbers of undirected edges (n, 2)."""
+def edge_keys(edges: Tensor, topology: Topology) -> Tensor:
+    """Numbers of undirected edges (n, 2), the same for both directions."""
     return edges.amin(1) * topology.num_vertices + edges.amax(1)
+
+
+class BoundaryBending(Constraint):
+    """Module form of :func:`boundary_bending_terms`: ``sum sqrt((l sin a)^2 + smoothing^2) - smoothing``, a length.
+
+    Args:
+        topology: Triangle mesh.
+        normals: (V, 3) prescribed unit normals at boundary vertices, zero where none is.
+        smoothing: Length below which ``l sin a`` counts as flat, above 0.
+    """
+
+    def __init__(self, topology: Topology, normals: Tensor, *, smoothing: float) -> None:
+        super().__init__(boundary_bending_terms(topology, normals, smoothing=smoothing))

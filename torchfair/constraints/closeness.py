@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from ..geometry.closest_point import ReferenceSurface
 from ..projection import ElementTerm
 from ..projection.layout import State
+from ._indexed import IndexedModule
 from .barrier import barrier, barrier_slope
+from .base import Constraint
 
 Feet = Callable[[State], tuple[Tensor, Tensor]]  # closest points (V, 3) and unit normals (V, 3)
 
@@ -20,7 +22,8 @@ class TangentPlanes:
 
     The normal points from the closest point to the vertex where they differ, so that the distance to the
     plane, its gradient and the true distance agree; on the surface it is the interpolated vertex normal.
-    The last answer is kept for the very tensor that was asked about, since several terms ask for the same state.
+    Both are constant for derivatives. The last answer is kept for the very tensor that was asked about, since several
+    terms ask for the same state; not for tensors that require gradients, which would keep their graph.
     """
 
     def __init__(self, reference: ReferenceSurface, block: str = "vertices") -> None:
@@ -34,6 +37,8 @@ class TangentPlanes:
         points = state[self.block]
         if self._answer is not None and self._is_last(points):
             return self._answer
+        asked = None if points.is_inference() or points.requires_grad else (points, points._version)
+        points = points.detach()
         closest = self._tracker.closest(points)
         away = points - closest.positions
         distance = closest.distances[:, None]
@@ -41,7 +46,7 @@ class TangentPlanes:
         side = torch.where((away * smooth).sum(1, keepdim=True) < 0.0, -1.0, 1.0).to(points.dtype)
         far = distance > 1e-9
         normals = torch.where(far, side * away / torch.where(far, distance, torch.ones_like(distance)), smooth)
-        self._asked = None if points.is_inference() else (points, points._version)
+        self._asked = asked
         self._answer = closest.positions, normals
         return self._answer
 
@@ -62,10 +67,6 @@ def plane_normals(x: Tensor, feet: Tensor, normals: Tensor) -> Tensor:
 
 def closeness_terms(planes: Feet, vertices: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
     """Distance of ``vertices`` (n,) from the reference surface, in their unit; ``planes`` are those of all vertices."""
-
-    def refresh(state: State) -> tuple[Tensor, ...]:
-        return tuple(part[vertices] for part in planes(state))
-
     stencil = [(block, vertices[:, None])]
     return [
         ElementTerm(
@@ -73,7 +74,7 @@ def closeness_terms(planes: Feet, vertices: Tensor, *, weight: float, block: str
             plane_distances,
             stencil,
             weight=weight,
-            refresh=refresh,
+            refresh=_ChosenPlanes(planes, vertices),
             jacobian=plane_normals,
             batched=True,
         )
@@ -85,16 +86,87 @@ def distance_limit_terms(planes: Feet, limits: Tensor, *, weight: float, block: 
 
     The limits are on the device of the vertices.
     """
-
-    def limit(x: Tensor, feet: Tensor, normals: Tensor, most: Tensor) -> Tensor:
-        return barrier(most - plane_distances(x, feet, normals).abs(), 0.5 * most)
-
-    def slope(x: Tensor, feet: Tensor, normals: Tensor, most: Tensor) -> Tensor:
-        distances = plane_distances(x, feet, normals)
-        return (-distances.sign() * barrier_slope(most - distances.abs(), 0.5 * most))[:, None] * normals
-
-    def refresh(state: State) -> tuple[Tensor, Tensor, Tensor]:
-        return (*planes(state), limits)
-
     stencil = [(block, torch.arange(limits.shape[0], device=limits.device)[:, None])]
-    return [ElementTerm("distance limit", limit, stencil, weight=weight, refresh=refresh, jacobian=slope, batched=True)]
+    refresh = _LimitedPlanes(planes, limits)
+    return [
+        ElementTerm(
+            "distance limit",
+            limited_distances,
+            stencil,
+            weight=weight,
+            refresh=refresh,
+            jacobian=limited_slopes,
+            batched=True,
+        )
+    ]
+
+
+def limited_distances(x: Tensor, feet: Tensor, normals: Tensor, most: Tensor) -> Tensor:
+    """Barriers (n,) at the distances ``most`` (n,)."""
+    return barrier(most - plane_distances(x, feet, normals).abs(), 0.5 * most)
+
+
+def limited_slopes(x: Tensor, feet: Tensor, normals: Tensor, most: Tensor) -> Tensor:
+    """(n, 3) their derivatives."""
+    distances = plane_distances(x, feet, normals)
+    return (-distances.sign() * barrier_slope(most - distances.abs(), 0.5 * most))[:, None] * normals
+
+
+class _ChosenPlanes(IndexedModule):
+    """Planes of some vertices of a state."""
+
+    def __init__(self, planes: Feet, vertices: Tensor) -> None:
+        super().__init__(vertices)
+        self.planes = planes
+
+    def forward(self, state: State) -> tuple[Tensor, ...]:
+        return tuple(part[self.indices[0]] for part in self.planes(state))
+
+
+class _LimitedPlanes(nn.Module):
+    """Planes and limits of all vertices of a state."""
+
+    limits: Tensor
+
+    def __init__(self, planes: Feet, limits: Tensor) -> None:
+        super().__init__()
+        self.planes = planes
+        self.register_buffer("limits", limits)
+
+    def forward(self, state: State) -> tuple[Tensor, ...]:
+        feet, normals = self.planes(state)
+        return feet, normals, self.limits.to(feet.dtype)
+
+
+class Closeness(Constraint):
+    """Module form of :func:`closeness_terms`: half the sum of squared distances from a surface, in length squared.
+
+    Exact are value and gradient, that of half the squared distance, which is the offset from the closest point: the
+    closest point is found for every member of a batch and constant for derivatives, and so is the normal of the plane
+    there. Second derivatives are therefore those of the planes; the curvature of the surface is left out. Nothing
+    flows to the reference.
+
+    The search for closest points runs on the CPU, wherever the vertices are. ``torch.compile`` breaks its graph there.
+
+    Args:
+        reference: The surface. It is part of the module and not of its ``state_dict``.
+        vertices: (n,) numbers of the vertices that are to be near it.
+    """
+
+    def __init__(self, reference: ReferenceSurface, vertices: Tensor) -> None:
+        super().__init__(closeness_terms(TangentPlanes(reference), vertices, weight=1.0))
+
+
+class DistanceLimit(Constraint):
+    """Module form of :func:`distance_limit_terms`: half the sum of squared barriers, dimensionless.
+
+    Zero where all vertices are within half their limits, infinite where one is beyond. Differentiated as
+    :class:`Closeness` is.
+
+    Args:
+        reference: The surface.
+        limits: (V,) largest distances, above 0; in the state as ``parts.0.refresh.limits``.
+    """
+
+    def __init__(self, reference: ReferenceSurface, limits: Tensor) -> None:
+        super().__init__(distance_limit_terms(TangentPlanes(reference), limits, weight=1.0))

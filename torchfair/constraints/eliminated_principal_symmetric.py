@@ -10,6 +10,7 @@ from ..principal.principal_edges import PrincipalStars
 from ..principal.sphere_derivatives import sphere_derivatives
 from ..principal.spheres import spheres_through
 from ..projection import ElementTerm
+from .base import Constraint
 from .principal_symmetric import COPLANAR, COSPHERICAL, coplanar, star_numbers
 from .star_stencils import by_vertices
 
@@ -69,24 +70,66 @@ def eliminated_principal_symmetric_terms(
     Raises:
         ShapeError: an end of an edge is no star.
     """
-    reach = torch.cat([stars.vertices[:, None], stars.cospherical], dim=1)
-    numbers = star_numbers(edges, stars)
-    both = torch.cat([reach[numbers[:, 0]], reach[numbers[:, 1]]], dim=1)
-    return [
-        ElementTerm(
-            COSPHERICAL,
-            eliminated_cospherical,
-            [(block, reach)],
-            weight=4.0 * weight,  # four neighbours miss the sphere alike
-            jacobian=eliminated_cospherical_derivative,
-            batched=True,
-        ),
-        ElementTerm(
-            COPLANAR,
-            eliminated_coplanar,
-            [(block, both)],
-            weight=weight,
-            jacobian=eliminated_coplanar_derivative,
-            batched=True,
-        ),
-    ]
+    return [_cospherical_term(stars, weight, block), _coplanar_term(edges, stars, weight, block)]
+
+
+def _cospherical_term(stars: PrincipalStars, weight: float, block: str) -> ElementTerm:
+    return ElementTerm(
+        COSPHERICAL,
+        eliminated_cospherical,
+        [(block, _reach(stars))],
+        weight=4.0 * weight,  # four neighbours miss the sphere alike
+        jacobian=eliminated_cospherical_derivative,
+        batched=True,
+    )
+
+
+def _coplanar_term(edges: Tensor, stars: PrincipalStars, weight: float, block: str) -> ElementTerm:
+    ends = _reach(stars)[star_numbers(edges, stars)]
+    return ElementTerm(
+        COPLANAR,
+        eliminated_coplanar,
+        [(block, ends.flatten(1))],
+        weight=weight,
+        jacobian=eliminated_coplanar_derivative,
+        batched=True,
+    )
+
+
+def _reach(stars: PrincipalStars) -> Tensor:
+    """(R, 5) vertices that the sphere of a star depends on, the star itself first."""
+    return torch.cat([stars.vertices[:, None], stars.cospherical], dim=1)
+
+
+class Cospherical(Constraint):
+    """The four neighbours of every star lie on a sphere that touches it, with the spheres eliminated.
+
+    Twice the sum of the squares by which :func:`~torchfair.principal.star_spheres` are missed (half of the square for
+    each of four neighbours), in length squared; unchanged by rigid motions. As in
+    :func:`eliminated_principal_symmetric_terms`; :func:`~torchfair.constraints.cospherical_terms` have spheres among
+    the unknowns, so they are no module.
+
+    Args:
+        stars: Regular vertices.
+    """
+
+    def __init__(self, stars: PrincipalStars) -> None:
+        super().__init__([_cospherical_term(stars, 1.0, "vertices")])
+
+
+class Coplanar(Constraint):
+    """Normals of spheres at the ends of edges lie in a plane with the edge, with the spheres eliminated.
+
+    Half the sum of squared determinants ``det(n(v), n(w), w - v)``, in length squared; unchanged by rigid motions.
+    Strips along polylines of such edges are developable where it is zero.
+
+    Args:
+        edges: (n, 2) principal edges between stars.
+        stars: Regular vertices, among them all ends of edges.
+
+    Raises:
+        ShapeError: an end of an edge is no star.
+    """
+
+    def __init__(self, edges: Tensor, stars: PrincipalStars) -> None:
+        super().__init__([_coplanar_term(edges, stars, 1.0, "vertices")])

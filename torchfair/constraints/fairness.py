@@ -6,11 +6,12 @@ import torch
 from torch import Tensor
 
 from ..geometry import second_differences, umbrella_vectors, vertex_normals
+from ..geometry._ops import angle_of, cross, dot, norm, unit
 from ..polylines import straight_triples
 from ..projection import ElementTerm
-from ..projection.layout import State
 from ..projection.term import Residual
 from ..topology import Topology
+from .base import Constraint
 from .star_stencils import closed_star_stencils
 
 _ROUNDS = 3  # of averaging over neighbours
@@ -21,10 +22,23 @@ def umbrella(x: Tensor) -> Tensor:
     return x[1:].mean(0) - x[0]
 
 
-def tangential_umbrella(x: Tensor, normal: Tensor) -> Tensor:
-    """:func:`umbrella` without its part along the unit ``normal``."""
-    vector = umbrella(x)
-    return vector - torch.dot(vector, normal) * normal
+def tangential_umbrella(x: Tensor) -> Tensor:
+    """:func:`umbrella` without its part along the normal of the star."""
+    vector, normal = umbrella(x), star_normal(x)
+    return vector - dot(vector, normal) * normal
+
+
+def star_normal(x: Tensor) -> Tensor:
+    """Unit normal of a star ``x`` (1 + k, 3): that of its sectors, weighted by their angles; zero if it has none.
+
+    The vertex normal of a triangle mesh, and of polygons that are planar around the vertex.
+    """
+    spokes = x[1:] - x[0]
+    after = spokes.roll(-1, 0)
+    sides = cross(spokes, after)
+    sizes = norm(sides)
+    weights = angle_of(sizes, dot(spokes, after)) / torch.where(sizes > 0, sizes, 1.0)
+    return unit((weights[:, None] * sides).sum(0))
 
 
 def second_difference(x: Tensor) -> Tensor:
@@ -61,17 +75,12 @@ def boundary_fairness_terms(
 def tangential_fairness_terms(topology: Topology, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
     """Umbrella vectors of interior vertices projected to the tangent planes: spreads vertices, bends nothing.
 
-    The tangent plane is that of the vertex normal, refreshed at every state.
+    The tangent plane is that of the vertex normal and follows the star, so that it is differentiated too.
     """
-    terms = []
-    for stencil in closed_star_stencils(topology):
-
-        def refresh(state: State, centres: Tensor = stencil[:, 0]) -> tuple[Tensor]:
-            return (vertex_normals(state[block], topology)[centres],)
-
-        star = [(block, stencil)]
-        terms.append(ElementTerm("tangential fairness", tangential_umbrella, star, weight=weight, refresh=refresh))
-    return terms
+    return [
+        ElementTerm("tangential fairness", tangential_umbrella, [(block, stencil)], weight=weight)
+        for stencil in closed_star_stencils(topology)
+    ]
 
 
 def even_fairness_terms(
@@ -152,3 +161,61 @@ def _between_quads(topology: Topology) -> Tensor:
     is_quad = (topology.face_sizes[topology.corner_faces] == 4).to(torch.int64)
     quads_at.index_add_(0, topology.corners, is_quad)
     return (quads_at == 4) & (topology.valences == 4) & ~topology.is_boundary_vertex
+
+
+class InteriorFairness(Constraint):
+    """Module form of :func:`interior_fairness_terms`: half the sum of squared vectors, in length squared.
+
+    Args:
+        topology: Any polygon mesh.
+    """
+
+    def __init__(self, topology: Topology) -> None:
+        super().__init__(interior_fairness_terms(topology, weight=1.0))
+
+
+class BoundaryFairness(Constraint):
+    """Module form of :func:`boundary_fairness_terms`: half the sum of squared vectors, in length squared.
+
+    Args:
+        topology: Any polygon mesh.
+        corners: (V,) bool, where the boundary may turn.
+    """
+
+    def __init__(self, topology: Topology, corners: Tensor) -> None:
+        super().__init__(boundary_fairness_terms(topology, corners, weight=1.0))
+
+
+class TangentialFairness(Constraint):
+    """Module form of :func:`tangential_fairness_terms`: half the sum of squared vectors, in length squared.
+
+    Args:
+        topology: Any polygon mesh.
+    """
+
+    def __init__(self, topology: Topology) -> None:
+        super().__init__(tangential_fairness_terms(topology, weight=1.0))
+
+
+class EvenFairness(Constraint):
+    """Module form of :func:`even_fairness_terms`: half the sum of squared vectors, in length squared.
+
+    Args:
+        vertices: (V, 3) whose even umbrella vectors are the targets, constant.
+        topology: Any polygon mesh.
+    """
+
+    def __init__(self, vertices: Tensor, topology: Topology) -> None:
+        super().__init__(even_fairness_terms(vertices.detach(), topology, weight=1.0))
+
+
+class DisplacementFairness(Constraint):
+    """Module form of :func:`displacement_fairness_terms`: half the sum of squared vectors, in length squared.
+
+    Args:
+        base: (V, 3) what displacements are from, constant.
+        topology: Any polygon mesh.
+    """
+
+    def __init__(self, base: Tensor, topology: Topology) -> None:
+        super().__init__(displacement_fairness_terms(base.detach(), topology, weight=1.0))

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from ..geometry.spline_curves import SplineCurves, SplineFeet
 from ..projection import ElementTerm
 from ..projection.layout import State
+from ._indexed import IndexedModule
+from .base import Constraint
 
 
-class CurveFeet:
+class CurveFeet(IndexedModule):
     """Closest points on their own curves of some vertices of a state.
 
-    The last query is kept, since several terms ask for the same state.
+    They are constant for derivatives. The last query is kept, since several terms ask for the same state; not that for
+    a tensor that requires gradients, which would keep its graph.
 
     Args:
         curves: Reference curves.
@@ -25,16 +30,33 @@ class CurveFeet:
     def __init__(
         self, curves: SplineCurves, vertices: Tensor, curve_of_vertex: Tensor, *, block: str = "vertices"
     ) -> None:
-        self.curves, self.vertices, self.curve_of_vertex, self.block = curves, vertices, curve_of_vertex, block
+        super().__init__(vertices, curve_of_vertex)
+        self.curves, self.block = curves, block
         self._asked: tuple[Tensor, int] | None = None
         self._answer: SplineFeet | None = None
 
-    def __call__(self, state: State) -> SplineFeet:
+    @property
+    def vertices(self) -> Tensor:
+        """(n,) vertices that glide."""
+        return self.indices[0]
+
+    @property
+    def curve_of_vertex(self) -> Tensor:
+        """(n,) on which of the curves."""
+        return self.indices[1]
+
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> CurveFeet:
+        super()._apply(fn, recurse)
+        self.curves = self.curves.to(self.vertices.device)
+        return self
+
+    def forward(self, state: State) -> SplineFeet:
         """Feet (n, ...) for the vertices of the state."""
         points = state[self.block]
         if self._answer is None or not self._is_last(points):
             self._answer = self.curves.closest(points[self.vertices], self.curve_of_vertex)
-            self._asked = None if points.is_inference() else (points, points._version)
+            untracked = not points.is_inference() and not points.requires_grad
+            self._asked = (points, points._version) if untracked else None
         return self._answer
 
     def _is_last(self, points: Tensor) -> bool:
@@ -65,19 +87,43 @@ def gliding_terms(feet: CurveFeet, *, weight: float) -> list[ElementTerm]:
     """
     if not feet.vertices.numel():
         return []
-
-    def refresh(state: State) -> tuple[Tensor, Tensor]:
-        found = feet(state)
-        return found.positions, torch.where(found.beyond_end[:, None], 0.0, found.tangents)
-
     return [
         ElementTerm(
             "boundary gliding",
             offset_from_curve,
             [(feet.block, feet.vertices[:, None])],
             weight=weight,
-            refresh=refresh,
+            refresh=_Tangents(feet),
             jacobian=offset_jacobian,
             batched=True,
         )
     ]
+
+
+class _Tangents(nn.Module):
+    """Feet and what is free there."""
+
+    def __init__(self, feet: CurveFeet) -> None:
+        super().__init__()
+        self.feet = feet
+
+    def forward(self, state: State) -> tuple[Tensor, Tensor]:
+        found = self.feet(state)
+        return found.positions, torch.where(found.beyond_end[:, None], 0.0, found.tangents)
+
+
+class Gliding(Constraint):
+    """Module form of :func:`gliding_terms`: half the sum of squared distances from curves, in length squared.
+
+    Exact are value and gradient, which is the offset from the closest point: closest points are found for every member
+    of a batch and are constant for derivatives, and so are tangents. Second derivatives are those of straight lines.
+    Nothing flows to the curves. ``torch.compile`` breaks its graph at the search.
+
+    Args:
+        curves: Reference curves; part of the module, not of its ``state_dict``.
+        vertices: (n,) numbers of the vertices.
+        curve_of_vertex: (n,) on which of the curves each is to be.
+    """
+
+    def __init__(self, curves: SplineCurves, vertices: Tensor, curve_of_vertex: Tensor) -> None:
+        super().__init__(gliding_terms(CurveFeet(curves, vertices, curve_of_vertex), weight=1.0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from torch import Tensor
 
 from ..projection import ElementTerm
+from .base import Constraint
 
 
 def offset(x: Tensor, target: Tensor) -> Tensor:
@@ -19,3 +20,15 @@ def handle_terms(
     if not vertices.numel():
         return []
     return [ElementTerm(name, offset, [(block, vertices[:, None])], data=(targets,), weight=weight, linear=True)]
+
+
+class Handles(Constraint):
+    """Module form of :func:`handle_terms`: half the sum of the squared distances, in length squared.
+
+    Args:
+        vertices: (n,) numbers.
+        targets: (n, 3) places. In the state as ``parts.0.target``; gradients flow to them if they require them.
+    """
+
+    def __init__(self, vertices: Tensor, targets: Tensor) -> None:
+        super().__init__(handle_terms(vertices, targets, weight=1.0))

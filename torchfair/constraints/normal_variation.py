@@ -9,6 +9,7 @@ from ..projection import ElementTerm, SmoothAbsolute
 from ..topology import Topology
 from ._components import components_first, cross, derivative_rows, dot
 from ._polygon_bend import PolygonBend, polygon_bend
+from .base import Constraint
 
 NAME = "normal variation"
 
@@ -29,7 +30,7 @@ def normal_variation_terms(
     """
     terms = []
     for (left, _), stencil in edge_stencils(topology).items():
-        bend = TRIANGLE_BEND if stencil.shape[1] == 4 else polygon_bend(left)
+        bend = pair_bend(left, stencil.shape[1])
         terms.append(
             ElementTerm(
                 NAME,
@@ -42,6 +43,21 @@ def normal_variation_terms(
             )
         )
     return terms
+
+
+class SmoothNormalVariation(Constraint):
+    """Module form of :func:`normal_variation_terms`: ``sum sqrt((l l*)^2 + smoothing^2) - smoothing``, a length.
+
+    At most :class:`~torchfair.energies.NormalVariation`, to which it tends as ``smoothing`` goes to 0; has no kink at
+    flat edges, so second derivatives are finite there. Unchanged by rigid motions.
+
+    Args:
+        topology: Any polygon mesh.
+        smoothing: Length below which ``l l*`` counts as flat, above 0.
+    """
+
+    def __init__(self, topology: Topology, *, smoothing: float) -> None:
+        super().__init__(normal_variation_terms(topology, smoothing=smoothing))
 
 
 def edge_stencils(topology: Topology) -> dict[tuple[int, int], Tensor]:
@@ -126,6 +142,11 @@ def _sides(x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
 
 TRIANGLE_BEND = PolygonBend(triangle_pair_bend, triangle_pair_bend_gradient)
+
+
+def pair_bend(left_size: int, corners: int) -> PolygonBend:
+    """Residual and Jacobian of edges whose left faces have ``left_size`` of all ``corners``."""
+    return TRIANGLE_BEND if corners == 4 else polygon_bend(left_size)
 
 
 def area_vector(polygon: Tensor) -> Tensor:

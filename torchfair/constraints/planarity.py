@@ -8,6 +8,7 @@ from torch import Tensor
 from ..projection import ElementTerm
 from ..topology import Topology
 from ._components import components_first, cross, derivative_rows, dot
+from .base import Constraint
 
 
 def diagonal_distance(x: Tensor) -> Tensor:
@@ -67,3 +68,30 @@ def planarity_terms(topology: Topology, faces: Tensor, *, weight: float, block: 
             batched=True,
         )
     ]
+
+
+class Planarity(Constraint):
+    """Module form of :func:`planarity_terms`: half the sum of the squared distances of diagonals, in length squared.
+
+    At least 0, unchanged by rigid motions; 0 exactly where the faces are planar. A quad with parallel diagonals, which
+    is not convex, makes it infinite unless it is planar, with gradient zero.
+
+    Args:
+        topology: Any polygon mesh.
+        faces: (n,) numbers of faces, by default all.
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> quad = torch.tensor([[0.0, 0, 0], [1, 0, 2], [1, 1, 0], [0, 1, 2]], requires_grad=True)
+        >>> planarity = Planarity(Topology.from_faces([[0, 1, 2, 3]]))
+        >>> planarity(quad)  # the diagonals are 2 apart
+        tensor(2., grad_fn=<AddBackward0>)
+        >>> [term.name for term in planarity.terms(weight=10.0)]
+        ['planarity']
+    """
+
+    def __init__(self, topology: Topology, faces: Tensor | None = None) -> None:
+        if faces is None:
+            faces = torch.arange(topology.num_faces, device=topology.device)
+        super().__init__(planarity_terms(topology, faces, weight=1.0))

@@ -16,6 +16,7 @@ from ..principal.principal_edges import PrincipalStars
 from ..principal.spheres import star_spheres
 from ..projection import ElementTerm
 from ..projection.layout import State
+from .base import Constraint
 
 NORMALS, CURVATURES = "sphere normals", "sphere curvatures"
 COSPHERICAL, COPLANAR = "cospherical neighbours", "coplanar normals"
@@ -144,6 +145,19 @@ def even_star_terms(stars: PrincipalStars, *, weight: float, block: str = "verti
         block: Name of the vertex block.
     """
     return [ElementTerm("even stars", unevenness, [(block, star_stencil(stars))], weight=weight, batched=True)]
+
+
+class EvenStars(Constraint):
+    """Module form of :func:`even_star_terms`: half the sum of squares, dimensionless.
+
+    Unchanged by similarities.
+
+    Args:
+        stars: Regular vertices.
+    """
+
+    def __init__(self, stars: PrincipalStars) -> None:
+        super().__init__(even_star_terms(stars, weight=1.0))
 
 
 def star_stencil(stars: PrincipalStars) -> Tensor:

@@ -28,6 +28,7 @@ from ..geometry._ops import cross, norm
 from ..principal.principal_edges import PrincipalStars
 from ..projection import ElementTerm, OneSided, Squares
 from ..projection.layout import State
+from .base import Constraint
 from .principal_symmetric import star_stencil
 from .side_curvatures import angle_excess, angle_excess_derivative, side_curvatures, side_curvatures_derivative
 from .star_stencils import by_vertices
@@ -170,6 +171,25 @@ class SaddleSides:
             batched=True,
         )
         return [term if ahead else replace(term, residual=broken, jacobian=broken_derivative, loss=Squares())]
+
+
+class SaddleShape(Constraint):
+    """Module form of :class:`SaddleSides`: half the sum of squares of what stars lack, dimensionless.
+
+    What each star is to be is decided at given vertices and kept, so that the value is continuous; make another module
+    to decide again. Zero where all stars are what they are to be, by ``margin``; unchanged by rigid motions.
+
+    Args:
+        stars: Regular vertices.
+        vertices: (V, 3) where it is decided.
+        margin: As of :class:`SaddleSides`.
+    """
+
+    def __init__(self, stars: PrincipalStars, vertices: Tensor, *, margin: float = 0.05) -> None:
+        sides = SaddleSides(stars, margin=margin)
+        sides.decide(vertices.detach())
+        data = sides({sides.block: vertices})
+        super().__init__([replace(term, refresh=None, data=data) for term in sides.terms(weight=1.0)])
 
 
 def _beyond(sides: Tensor, spheres: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ import math
 import torch
 from torch import Tensor
 
-from ..geometry._ops import cross, dot, norm, unit
+from ..geometry._ops import angle_of, cross, dot, norm, unit
 from ..principal.sphere_derivatives import sphere_derivatives
 from ..principal.spheres import spheres_through
 
@@ -22,7 +22,7 @@ def angle_excess(x: Tensor) -> Tensor:
     """Angle sum minus 2 pi at the first of the vertices ``x`` (n, 7, 3); positive where curvature is negative."""
     spokes = x[:, 1:] - x[:, :1]
     after = spokes.roll(-1, 1)
-    angles = torch.atan2(norm(cross(spokes, after)), dot(spokes, after))
+    angles = angle_of(norm(cross(spokes, after)), dot(spokes, after))
     return angles.sum(1) - 2.0 * math.pi
 
 

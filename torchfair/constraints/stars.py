@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
 import torch
 from torch import Tensor
@@ -13,6 +13,8 @@ from ..stars._saddle_targets import saddle_planes, saddle_sides, star_shape
 from ..stars.pyramid_penalty import crossing_depths
 from ..stars.saddle_penalty import saddle_defects, saddle_groups
 from ..topology import Topology
+from ._indexed import IndexedModule
+from .base import Constraint
 from .star_stencils import closed_star_stencils
 
 
@@ -62,15 +64,11 @@ def saddle_terms(
     Raises:
         MeshError: a chosen vertex cannot be a saddle.
     """
-
-    def miss(x: Tensor, sides: Tensor, normal: Tensor) -> Tensor:
-        return saddle_defects(x[1:] - x[0], sides, normal, margin)
-
-    terms = []
+    terms, miss = [], partial(saddle_miss, margin=margin)
     for group in saddle_groups(topology, saddles):
         stencil = torch.cat([group.centres[:, None], group.ring], dim=1)
         sides = saddle_sides(_arms(vertices.detach(), stencil), group.patterns)
-        refresh = _planes_of(block, stencil, sides, margin)
+        refresh = _Planes(block, stencil, sides, margin)
         terms.append(ElementTerm("good saddles", miss, [(block, stencil)], weight=weight, refresh=refresh))
     return terms
 
@@ -81,8 +79,52 @@ def _arms(vertices: Tensor, stencil: Tensor) -> Tensor:
     return stars[:, 1:] - stars[:, :1]
 
 
-def _planes_of(block: str, stencil: Tensor, sides: Tensor, margin: float) -> Callable[[State], tuple[Tensor, Tensor]]:
-    def refresh(state: State) -> tuple[Tensor, Tensor]:
-        return sides, saddle_planes(_arms(state[block], stencil), sides, margin)
+def saddle_miss(x: Tensor, sides: Tensor, normal: Tensor, *, margin: float) -> Tensor:
+    """By how much a star ``x`` (1 + k, 3) misses being a good saddle with a given plane."""
+    return saddle_defects(x[1:] - x[0], sides, normal, margin)
 
-    return refresh
+
+class _Planes(IndexedModule):
+    """Sides of the edges of stars, and planes that follow the state."""
+
+    sides: Tensor
+
+    def __init__(self, block: str, stencil: Tensor, sides: Tensor, margin: float) -> None:
+        super().__init__(stencil)
+        self.block, self.margin = block, margin
+        self.register_buffer("sides", sides)
+
+    def forward(self, state: State) -> tuple[Tensor, Tensor]:
+        points = state[self.block]
+        sides = self.sides.to(points.dtype)
+        return sides, saddle_planes(_arms(points, self.indices[0]), sides, self.margin)
+
+
+class NormalPyramids(Constraint):
+    """Module form of :func:`pyramid_terms`: half the sum of squared depths of crossings, dimensionless.
+
+    Half of :class:`~torchfair.stars.PyramidPenalty` where faces are planar.
+
+    Args:
+        topology: Any polygon mesh.
+    """
+
+    def __init__(self, topology: Topology) -> None:
+        super().__init__(pyramid_terms(topology, weight=1.0))
+
+
+class GoodSaddles(Constraint):
+    """Module form of :func:`saddle_terms`: half the sum of squares by which stars miss it, dimensionless.
+
+    Sides are decided at given vertices and kept. Planes follow the vertices of each member of a batch and are constant
+    for derivatives.
+
+    Args:
+        vertices: (V, 3) where sides are decided.
+        topology: Any polygon mesh.
+        saddles: (V,) bool, inner vertices with 4 to 16 edges.
+        margin: As of :func:`saddle_terms`.
+    """
+
+    def __init__(self, vertices: Tensor, topology: Topology, saddles: Tensor, *, margin: float = 0.0) -> None:
+        super().__init__(saddle_terms(vertices, topology, saddles, weight=1.0, margin=margin))

@@ -13,6 +13,7 @@ from ..geometry._ops import scatter_sum
 from ..geometry.normals import normalise
 from ..projection import ElementTerm
 from ..topology import Topology
+from .base import Constraint
 from .boundary_jets import BoundaryJets, slopes_of_patch
 from .star_stencils import open_star_stencils
 
@@ -151,6 +152,37 @@ def tangent_patch_terms(
         targets = BoundaryNormals.of(vertices, topology).star_targets(prescribed)[chosen]
         terms += tangent_plane_terms(topology, chosen[~fits], targets[~fits], weight=weight, block=block)
     return terms
+
+
+class TangentStars(Constraint):
+    """Module form of :func:`tangent_plane_terms`: half the sum of squared sines of angles, dimensionless.
+
+    Unchanged if the mesh is moved along or scaled. Normals opposite to the prescribed ones cost nothing.
+
+    Args:
+        topology: Triangle mesh.
+        vertices: (n,) numbers of boundary vertices.
+        normals: (n, 3) unit normals of stars, see :class:`BoundaryNormals`.
+    """
+
+    def __init__(self, topology: Topology, vertices: Tensor, normals: Tensor) -> None:
+        super().__init__(tangent_plane_terms(topology, vertices, normals, weight=1.0))
+
+
+class TangentPatches(Constraint):
+    """Module form of :func:`tangent_patch_terms`: half the sum of squared slopes, dimensionless.
+
+    Patches are frozen at given vertices; make another module where the surface has changed much.
+
+    Args:
+        vertices: (V, 3) near which the module is used.
+        topology: Triangle mesh.
+        chosen: (n,) numbers of boundary vertices.
+        normals: (n, 3) unit normals of the surface.
+    """
+
+    def __init__(self, vertices: Tensor, topology: Topology, chosen: Tensor, normals: Tensor) -> None:
+        super().__init__(tangent_patch_terms(vertices.detach(), topology, chosen, normals, weight=1.0))
 
 
 def tangent_frames(normals: Tensor) -> tuple[Tensor, Tensor]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import torch
 from torch import Tensor
 
@@ -24,6 +26,12 @@ class BoxDescent:
         self._depths = [*range(min(_TOP, tree.depth), tree.depth, _STEP), tree.depth]
         self._levels = [torch.from_numpy(tree.level(depth)).to(device) for depth in self._depths]
         self._items = torch.from_numpy(tree.items).to(device)
+
+    def to(self, device: torch.device | str) -> BoxDescent:
+        """The same for points on another device."""
+        moved = copy.copy(self)
+        moved._levels, moved._items = [level.to(device) for level in self._levels], self._items.to(device)
+        return moved
 
     def candidates(self, points: Tensor) -> Tensor:
         """Items (N, k) whose boxes are nearest to ``points`` (d, N), and others where there are fewer than k.

@@ -56,6 +56,12 @@ def norm(x: Tensor) -> Tensor:
     return torch.where(positive, torch.where(positive, squared, 1.0).sqrt(), 0.0)
 
 
+def angle_of(sine: Tensor, cosine: Tensor) -> Tensor:
+    """``atan2(sine, cosine)``; zero with zero derivatives, forward and back, where both are zero."""
+    defined = (sine != 0) | (cosine != 0)
+    return torch.atan2(torch.where(defined, sine, 0.0), torch.where(defined, cosine, 1.0))
+
+
 def unit(x: Tensor) -> Tensor:
     """Vectors along the last dimension divided by their length; zero with zero derivatives where that is zero."""
     lengths = norm(x)

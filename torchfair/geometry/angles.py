@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ..topology import Topology
-from ._ops import cross, dot, gather, norm, scatter_sum
+from ._ops import angle_of, cross, dot, gather, norm, scatter_sum
 from .areas import face_area_vectors
 
 
@@ -36,8 +36,7 @@ def corner_angles(vertices: Tensor, topology: Topology) -> Tensor:
     behind = torch.zeros_like(ahead).index_copy(-2, topology.next_corners, -ahead)  # from the corner back
     normal = cross(ahead, behind)
     sine, cosine = norm(normal), dot(ahead, behind)
-    defined = (sine > 0) | (cosine != 0)
-    angles = torch.atan2(torch.where(defined, sine, 0.0), torch.where(defined, cosine, 1.0))
+    angles = angle_of(sine, cosine)
     if topology.is_triangular:
         return angles
     areas = gather(face_area_vectors(vertices, topology), topology.corner_faces)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -101,6 +102,18 @@ class SplineCurves:
         labels = knots.curves, knots.is_first, knots.is_last
         self._labels = [torch.from_numpy(label).to(device) for label in labels]
         self._first = torch.from_numpy(np.searchsorted(knots.curves, np.arange(len(points)))).to(device)
+
+    def to(self, device: torch.device | str) -> SplineCurves:
+        """The same curves for queries on another device; itself if it is there."""
+        if self._coefficients.device == torch.device(device):
+            return self
+        moved = copy.copy(self)
+        moved._descent = self._descent.to(device)
+        moved._coefficients, moved._ends = self._coefficients.to(device), self._ends.to(device)
+        moved._feet = SegmentFeet(moved._coefficients)
+        moved._labels = [label.to(device) for label in self._labels]
+        moved._first = self._first.to(device)
+        return moved
 
     def at(self, curves: Tensor, segments: Tensor, fractions: Tensor) -> Tensor:
         """Positions (N, 3) float64 at ``fractions`` (N,) of ``segments`` (N,) of ``curves`` (N,)."""
