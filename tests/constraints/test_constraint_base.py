@@ -143,8 +143,6 @@ def test_overflow_is_no_degenerate_element() -> None:
 
 def test_anomaly_mode_finds_nothing_in_degenerate_elements() -> None:
     variable = torch.zeros(16, 3, dtype=DOUBLE, requires_grad=True)
-    with torch.autograd.set_detect_anomaly(True), pytest.warns(UserWarning, match="Anomaly Detection has been enabled"):
-        pass
     with pytest.warns(UserWarning, match="Anomaly Detection"), torch.autograd.detect_anomaly():
         Planarity(wavy_grid(4, 4)[1])(variable).backward()
     assert not variable.grad.any()
@@ -197,7 +195,7 @@ def test_errors_of_a_residual_name_the_term() -> None:
 
 
 def test_a_batch_is_nothing_for_a_term() -> None:
-    with pytest.raises(ShapeError, match=r"term 'length', block 'vertices': expected \(n, d\), one state"):
+    with pytest.raises(ShapeError, match=r"term 'length', block 'vertices': expected \(n, 3\), of one member"):
         lengths().arguments({"vertices": VERTICES.expand(30, -1, -1)})
 
 

@@ -82,9 +82,7 @@ class ElementTerm:
         """Arguments of :attr:`residual` for all elements at once: ``(n, k, d)`` locals, then the data."""
         for name, _ in self.stencil:
             if state[name].ndim != 2:
-                expected = (
-                    f"(n, {state[name].shape[-1]}), of one member (torchfair.constraints.Constraint takes batches)"
-                )
+                expected = f"(n, {state[name].shape[-1]}), of one member (constraints.Constraint takes batches)"
                 raise ShapeError(f"term '{self.name}', block '{name}'", expected, tuple(state[name].shape))
         local = tuple(state[name][index] for name, index in self.stencil)
         data = self.data
