@@ -39,3 +39,7 @@ def test_derivative_is_finite_everywhere_and_zero_where_silent() -> None:
     assert torch.isfinite(slope).all()
     assert (slope[1:3] < 0).all()
     assert (slope[3:] == 0).all()
+
+
+def test_nan_does_not_pass_for_safe() -> None:
+    assert barrier(torch.tensor(torch.nan), torch.tensor(1.0)).isnan()

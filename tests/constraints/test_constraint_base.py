@@ -13,7 +13,7 @@ from torch import Tensor, nn
 
 from torchfair import ShapeError, constraints
 from torchfair.constraints import Closeness, Constraint, Handles, Planarity, TangentPlanes
-from torchfair.geometry import ReferenceSurface
+from torchfair.geometry import ReferenceSurface, SplineCurves
 from torchfair.projection import ElementTerm, OneSided, guided_projection
 from torchfair.projection.problem import Problem
 from torchfair.projection.steps import init
@@ -210,6 +210,16 @@ def test_tangent_planes_keep_no_graph() -> None:
     (gradient,) = torch.autograd.grad(module(variable), variable)
     feet = ReferenceSurface(VERTICES, TOPOLOGY).closest(variable.detach()).positions
     torch.testing.assert_close(gradient, variable.detach() - feet)
+
+
+def test_feet_on_curves_keep_no_graph() -> None:
+    feet = constraints.CurveFeet(
+        SplineCurves([VERTICES[:5]], [False]), torch.arange(5), torch.zeros(5, dtype=torch.int64)
+    )
+    assert not feet({"vertices": moved(VERTICES).requires_grad_()}).positions.requires_grad
+    assert feet._asked is None
+    state = {"vertices": moved(VERTICES)}
+    assert feet(state) is feet(state)
 
 
 def test_every_member_of_a_batch_has_its_own_closest_points() -> None:

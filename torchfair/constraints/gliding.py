@@ -50,6 +50,11 @@ class CurveFeet(IndexedModule):
         self.curves = self.curves.to(self.vertices.device)
         return self
 
+    def __call__(self, state: State) -> SplineFeet:
+        """Feet (n, ...) for the vertices of the state."""
+        feet: SplineFeet = super().__call__(state)
+        return feet
+
     def forward(self, state: State) -> SplineFeet:
         """Feet (n, ...) for the vertices of the state."""
         points = state[self.block]
