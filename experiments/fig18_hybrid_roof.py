@@ -87,7 +87,7 @@ def run_job(vertices: Tensor, topology: Topology, config: Config, formulation: s
         "relative_change": result.after["normal_variation"] / result.before["normal_variation"] - 1,
         "unknowns": 3 * topology.num_vertices,
         "status": projection.status,
-        "iterations": projection.iterations,
+        "iterations": steps,
         "seconds": seconds,
         "seconds_per_iteration": seconds / steps,
         "cpu_seconds_per_iteration": cpu / steps,  # does not count what else the machine was doing
