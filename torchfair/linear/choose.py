@@ -17,6 +17,8 @@ _DENSE_LIMIT = 120
 _RSLAB_LIMIT = 200_000
 _SCIPY_LIMIT = 30_000
 
+SOLVERS = ("auto", "dense", "scipy", "rslab", "cg")  # what people may ask for
+
 
 def choose_solver(name: str, pattern: Pattern) -> LinearSolver:
     """A solver by name, or the fastest that suits the size of the problem.

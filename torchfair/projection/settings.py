@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from .._numbers import check_count, check_number
 from .._shown import shown
 from ..errors import SettingsError
 from ..linear import LinearSolver
+from ..linear.choose import SOLVERS
+from ..settings import setting
+
+DampingScale = Literal["diagonal", "identity"]
+WhenSettled = Literal["go on", "judge", "stop"]
 
 
 @dataclass(frozen=True)
@@ -48,18 +54,18 @@ class ProjectionSettings:
 
     max_iterations: int = 100
     initial_damping: float = 1e-3
-    damping_scale: str = "diagonal"
+    damping_scale: DampingScale = "diagonal"
     gradient_tolerance: float = 1e-12
     step_tolerance: float = 1e-10
     merit_tolerance: float = 1e-9
     patience: int = 3
     patience_when_damped: int = 4
-    when_settled: str = "go on"
+    when_settled: WhenSettled = "go on"
     least_extrapolation: float = 1.25
     least_uncorrected_gain: float = 0.9
-    time_limit: float | None = None
+    time_limit: float | None = setting(None, unit="seconds")
     accuracy: float = 1e-2
-    solver: str | LinearSolver = "auto"
+    solver: str | LinearSolver = setting("auto", choices=SOLVERS)
 
     @classmethod
     def given(cls, settings: object) -> ProjectionSettings:
@@ -71,9 +77,9 @@ class ProjectionSettings:
         return settings
 
     def __post_init__(self) -> None:
-        if self.damping_scale not in ("diagonal", "identity"):
+        if self.damping_scale not in get_args(DampingScale):
             raise SettingsError(f"damping_scale must be 'diagonal' or 'identity', got {self.damping_scale!r}")
-        if self.when_settled not in ("go on", "judge", "stop"):
+        if self.when_settled not in get_args(WhenSettled):
             raise SettingsError(f"when_settled must be 'go on', 'judge' or 'stop', got {self.when_settled!r}")
         check_count("max_iterations", self.max_iterations, least=0)
         check_count("patience", self.patience, least=1)
