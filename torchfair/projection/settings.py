@@ -22,7 +22,7 @@ class ProjectionSettings:
     """Settings of the damped iteration; all dimensionless.
 
     Attributes:
-        max_iterations: Bound on damped steps, rejected ones included.
+        max_iterations: Bound on the damped steps of a run, rejected ones included.
         initial_damping: First Levenberg-Marquardt parameter, relative to the damping scale.
         damping_scale: ``"diagonal"`` damps each unknown in proportion to its stiffness (the largest diagonal entry of
             ``J^T J`` met so far, More 1978), which makes the iteration independent of the units of the unknowns;
@@ -43,10 +43,11 @@ class ProjectionSettings:
             infinity never tries.
         least_uncorrected_gain: A step that gained less than this, relative to what the model promised, is tried again
             with a second-order correction; minus infinity never tries.
-        time_limit: Seconds, or None.
+        time_limit: After so many seconds the best state so far is returned; None for no limit.
         accuracy: Relative remainder with which an iterative linear solver starts; tightened as the merit
             settles.
-        solver: Name of a linear solver (see ``choose_solver``) or an object with that protocol.
+        solver: Linear solver by name (see ``choose_solver``), ``"auto"`` for the fastest at this size; or an object with
+            that protocol.
 
     Raises:
         SettingsError: a setting is out of its range; names it.

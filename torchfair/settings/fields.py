@@ -7,10 +7,11 @@ import inspect
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, get_type_hints
 
 from .kinds import Kind, Switch, kinds_of
+
+_KNOWN: dict[type, dict[str, SettingField]] = {}
 
 
 @dataclass(frozen=True)
@@ -68,14 +69,15 @@ class SettingField:
         raise ValueError(f"expected {words}, got {value!r}")
 
 
-@lru_cache
 def fields_of(kind: type) -> dict[str, SettingField]:
     """All fields of a settings dataclass by name, in order, those of dataclasses inside it in their place.
 
     Raises:
         TypeError: a field has no default, or a type that cannot be written in a file.
     """
-    return {field.name: field for field in _fields(kind, kind(), "")}
+    if kind not in _KNOWN:
+        _KNOWN[kind] = {field.name: field for field in _fields(kind, kind(), "")}
+    return _KNOWN[kind]
 
 
 def _fields(kind: Any, defaults: Any, prefix: str) -> Iterator[SettingField]:
@@ -94,7 +96,7 @@ def _texts(kind: type) -> dict[str, str]:
     """What the section ``Attributes:`` of a docstring says of every name, without markup."""
     section = re.search(r"^Attributes:\n(.*?)(?:^\S|\Z)", inspect.getdoc(kind) or "", re.M | re.S)
     entries = re.split(r"^ {4}(?=\w[\w, ]*: )", section[1] if section else "", flags=re.M)[1:]
-    texts = {}
+    texts: dict[str, str] = {}
     for entry in entries:
         names, _, text = entry.partition(": ")
         texts |= dict.fromkeys(names.split(", "), _without_markup(" ".join(text.split())))
