@@ -46,8 +46,8 @@ class ProjectionSettings:
         time_limit: After so many seconds the best state so far is returned; None for no limit.
         accuracy: Relative remainder with which an iterative linear solver starts; tightened as the merit
             settles.
-        solver: Linear solver by name (see ``choose_solver``), ``"auto"`` for the fastest at this size; or an object with
-            that protocol.
+        solver: Linear solver by name (see ``choose_solver``), ``"auto"`` for the fastest at this size; or an object
+            with that protocol.
 
     Raises:
         SettingsError: a setting is out of its range; names it.
