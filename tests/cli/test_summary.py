@@ -72,4 +72,4 @@ def test_what_is_missed_is_said_once_at_the_end() -> None:
     assert lines == ["x 2, at most 1 asked for: NOT REACHED; pull less"]
     assert note_lines(["a", f"level 1: {missed}", "b"], lines) == ["note: a", "note: b"]
     assert missed_lines(job(kept, levels=2), 1) == []
-    assert missed_lines(job(kept, levels=2), 3) == ["1 of 3 refinements: NOT REACHED; done"]
+    assert missed_lines(job(kept, levels=2), 2) == ["1 of 2 refinements: NOT REACHED; done"]
