@@ -11,10 +11,7 @@ from helpers import wavy_grid
 from interruptions import nth, press
 
 from torchfair.cli import main
-from torchfair.cli.command import build_parser
-from torchfair.cli.fair import read_settings
 from torchfair.energies import normal_variation
-from torchfair.formfinding import FairSettings
 from torchfair.io import load_mesh, save_mesh
 
 QUIET = ["--iterations", "3", "--no-pictures"]
@@ -35,11 +32,6 @@ def error_line(capsys: pytest.CaptureFixture[str]) -> str:
     assert err.count("\n") == 1
     assert err.startswith("torchfair fair: error: ")
     return err
-
-
-def test_what_is_not_said_is_as_in_the_library() -> None:
-    """A default that stands twice may not differ."""
-    assert read_settings(build_parser().parse_args(["fair", "roof.obj", "-o", "smooth.obj"])) == FairSettings()
 
 
 def test_mesh_report_and_pictures_are_written(roof: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -55,10 +55,13 @@ def test_what_was_not_reached_is_the_last_line_and_exit_code_1(
     assert f"kept: {kept[0]['name']}" in out
 
 
-def test_refinements_that_were_not_reached_give_exit_code_1(roof: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["--levels", "2", "--time-limit", "0", "--no-pictures"]
+def test_refinements_that_were_not_reached_give_exit_code_1(
+    roof: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("torchfair.progress.ProgressDisplay.__call__", lambda display, record: True)  # stop at once
+    words = ["--levels", "2", "--no-pictures"]
     assert main(["form", str(roof), "-o", str(roof.parent / "x.obj"), *words]) == 1
-    assert "0 of 2 refinements: NOT REACHED; time_limit reached" in capsys.readouterr().out.splitlines()[-1]
+    assert "0 of 2 refinements: NOT REACHED; stopped by the callback" in capsys.readouterr().out.splitlines()[-1]
 
 
 def test_a_report_given_back_as_settings_finds_the_same_mesh_to_the_last_bit(roof: Path, tmp_path: Path) -> None:

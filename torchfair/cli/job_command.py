@@ -115,7 +115,7 @@ class JobCommand(ABC):
         return self._exit_code(result, missed)
 
     def _solve(self, request: Request, settings: Any) -> JobResult[Any]:
-        from .progress import ProgressDisplay
+        from ..progress import ProgressDisplay
 
         job, start = self.function(), request.start or (request.mesh.vertices, request.mesh.topology)
         with ProgressDisplay(self.most_steps(settings)) as display:
@@ -125,10 +125,9 @@ class JobCommand(ABC):
         self, arguments: argparse.Namespace, request: Request, result: JobResult[Any], settings: Any
     ) -> dict[str, Any]:
         from ..formfinding import job_report
-        from .report import versions
 
         asked = {name: value for name, value in vars(arguments).items() if name not in _NOT_ASKED and "." not in name}
-        own = {"job": self.job, "request": asked, "versions": versions(), **request.report}
+        own = {"job": self.job, "request": asked, **request.report}
         return {**own, **job_report(result, settings)}
 
     def _exit_code(self, result: JobResult[Any], missed: Sequence[str]) -> int:

@@ -32,6 +32,7 @@ HIDDEN = {
         "gradient_tolerance",
         "step_tolerance",
         "patience",
+        "patience_when_damped",
         "when_settled",
         "least_extrapolation",
         "least_uncorrected_gain",

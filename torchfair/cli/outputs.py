@@ -93,10 +93,9 @@ class Outputs:
 
     def write_others(self, report: Mapping[str, Any], request: Request, result: Any) -> None:
         """Writes the rest."""
-        from ..io import atomic_write_text
-        from .plain import to_json
+        from ..io import write_report
 
-        atomic_write_text(self.report, to_json(report), overwrite=self.force)
+        write_report(self.report, report, overwrite=self.force)
         self._write(self.pictures | self.others, request, result)
 
     def _write(self, files: Mapping[Path, Writer], request: Request, result: Any) -> None:

@@ -64,9 +64,9 @@ class SymmetricCommand(JobCommand):
     def function(self) -> Callable[..., JobResult[Any]]:
         """See the base class."""
         from ..formfinding import principal_symmetric
-        from ._until_ported import ported
+        from .older_results import as_job
 
-        return ported(principal_symmetric)
+        return as_job(principal_symmetric)
 
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh with principal edges, handles, a reference, and strips to make."""
