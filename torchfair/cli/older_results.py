@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 from ..formfinding import JobResult, Level
 
@@ -35,4 +35,4 @@ def _levels_of_stages(result: Any) -> list[Level]:
 def _with_topology(level: Any) -> Level:
     made = Level(level.vertices, level.principal.topology, level.before, level.after, level.runs, [])
     vars(made).update(principal=level.principal, normals=level.normals)
-    return cast(Level, made)
+    return made
