@@ -5,4 +5,5 @@ from .fields import fields_of as fields_of
 from .files import plain_settings as plain_settings
 from .files import read_settings as read_settings
 from .files import settings_from as settings_from
+from .kinds import Kind as Kind
 from .setting import setting as setting
