@@ -16,7 +16,6 @@ class Kind(ABC):
 
     Attributes:
         words: What is expected in a file, in words.
-        spoken: What is expected on a command line; the same unless units differ.
         symbol: For the help of options.
     """
 
@@ -25,7 +24,7 @@ class Kind(ABC):
 
     @property
     def spoken(self) -> str:
-        """What is expected on a command line, in words."""
+        """What is expected on a command line, in words; the same unless units differ."""
         return self.words
 
     @abstractmethod
