@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parent.parent
 FLOORS = (
     {"errors", "_interrupts", "_shown", "_threads"},
     {"_half_edges", "_numbers", "cameras", "linear", "progress", "rasterisation"},
+    {"settings"},
     {"_connectivity", "projection"},
     {"topology"},
     {"_graph", "boundary", "geometry", "polylines", "repair", "triangulation"},

@@ -11,10 +11,7 @@ from helpers import wavy_grid
 from interruptions import nth, press
 
 from torchfair.cli import main
-from torchfair.cli.command import build_parser
-from torchfair.cli.fair import read_settings
 from torchfair.energies import normal_variation
-from torchfair.formfinding import FairSettings
 from torchfair.io import load_mesh, save_mesh
 
 QUIET = ["--iterations", "3", "--no-pictures"]
@@ -37,11 +34,6 @@ def error_line(capsys: pytest.CaptureFixture[str]) -> str:
     return err
 
 
-def test_what_is_not_said_is_as_in_the_library() -> None:
-    """A default that stands twice may not differ."""
-    assert read_settings(build_parser().parse_args(["fair", "roof.obj", "-o", "smooth.obj"])) == FairSettings()
-
-
 def test_mesh_report_and_pictures_are_written(roof: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "smooth" / "roof.ply"
     assert main(["fair", str(roof), "-o", str(output), "--iterations", "8"]) == 0
@@ -56,8 +48,15 @@ def test_mesh_report_and_pictures_are_written(roof: Path, tmp_path: Path, capsys
         )
     assert energies["after"]["normal_variation"] < energies["before"]["normal_variation"]
     assert report["settings"]["boundary"] == "glide"
-    assert {"name", "mean", "largest", "weight", "merit"} <= report["residuals"][0].keys()
-    assert report["history"][0]["iteration"] == 0
+    runs = report["levels"][0]["runs"]
+    for run in runs:
+        assert {"name", "mean", "largest", "weight", "merit"} <= run["residuals"][0].keys()
+        assert [record["iteration"] for record in run["history"]] == list(range(run["steps"] + 1))
+    assert len(runs) == 3
+    assert report["steps"] == sum(run["steps"] for run in runs)
+    assert report["seconds"] == pytest.approx(sum(run["timings"]["total"] for run in runs))
+    assert report["timings"]["total"] == pytest.approx(report["seconds"])
+    assert f"{report['steps']} steps in 3 runs, {report['seconds']:.2f} s: {runs[-1]['message']}" in out
     assert report["versions"]["torch"] == torch.__version__
     for name in ("before_after.png", "edges.png", "gauss_images.png"):
         assert (output.parent / name).read_bytes().startswith(b"\x89PNG")
@@ -135,7 +134,7 @@ def test_interruption_writes_the_best_mesh(
 
     monkeypatch.setattr(ProgressDisplay, "__call__", interrupt)
     output = tmp_path / "out.obj"
-    assert main(["fair", str(roof), "-o", str(output), "--no-pictures"]) == 0
+    assert main(["fair", str(roof), "-o", str(output), "--no-pictures"]) == 130
     assert "interrupted" in capsys.readouterr().out
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["status"] == "interrupted"
@@ -154,9 +153,9 @@ def test_ctrl_c_while_setting_up_or_measuring_writes_everything(
     name = place.split(".")[-1]
     monkeypatch.setattr(owner, name, nth(getattr(owner, name), 1 + (place == "fair_measures"), press))
     output = tmp_path / "out.obj"
-    assert main(["fair", str(roof), "-o", str(output), *QUIET]) == 0
-    report = json.loads((tmp_path / "report.json").read_text())
     cut = name != "fair_measures"  # measuring is finished, and nothing more was to be done
+    assert main(["fair", str(roof), "-o", str(output), *QUIET]) == (130 if cut else 0)
+    report = json.loads((tmp_path / "report.json").read_text())
     assert (report["status"] == "interrupted") is cut
     assert ("interrupted" in capsys.readouterr().out) is cut
     energies = [report["energies"][when]["normal_variation"] for when in ("before", "after")]
@@ -184,5 +183,5 @@ def test_options_reach_the_settings(roof: Path, tmp_path: Path) -> None:
     settings = report["settings"]
     assert settings["distance_limit"] is None
     assert (settings["boundary"], settings["planar"], settings["fairness_weight"]) == ("fixed", "none", 0.7)
-    assert report["solver"] == "scipy"
+    assert {run["solver"] for level in report["levels"] for run in level["runs"]} == {"scipy"}
     assert settings["projection"]["max_iterations"] == 3

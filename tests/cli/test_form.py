@@ -63,8 +63,10 @@ def test_mesh_report_and_pictures_are_written(tmp_path: Path, capsys: pytest.Cap
     assert after.topology.num_faces == 4 * topology.num_faces
     energies = report["energies"]
     assert energies["after"]["total_absolute_curvature"] < energies["before"]["total_absolute_curvature"]
-    assert {stage["level"] for stage in report["stages"]} == {0, 1}
-    assert report["stages"][0]["history"][0]["total_absolute_curvature"] > 0
+    assert len(report["levels"]) == 2
+    assert all(level["runs"] for level in report["levels"])
+    assert report["levels"][0]["runs"][0]["history"][0]["total_absolute_curvature"] > 0
+    assert report["steps"] == sum(run["steps"] for level in report["levels"] for run in level["runs"])
     assert report["settings"]["boundary"] == "fixed"
     for name in ("curvature.png", "edges.png"):
         assert (output.parent / name).read_bytes().startswith(b"\x89PNG")

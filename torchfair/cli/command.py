@@ -5,44 +5,23 @@ from __future__ import annotations
 import argparse
 import io
 import os
-import re
 import sys
 from collections.abc import Sequence
-from typing import Any, NoReturn, TextIO
+from typing import TextIO
 
 from ..errors import TorchfairError
 from . import diagnose, fair, form, measure, reflect, symmetric
 from .errors import CommandError
+from .exit_codes import EXIT_BROKEN_PIPE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_OK, IN_WORDS
+from .parser import CommandParser
 
-EXIT_OK = 0
-EXIT_ERROR = 2
-EXIT_INTERRUPTED = 130
-EXIT_BROKEN_PIPE = 141  # what a shell reports for a program ended by SIGPIPE
-
-_COMMANDS = (measure, diagnose, reflect, fair, form, symmetric)
+_COMMANDS = (measure, diagnose, reflect, fair.COMMAND, form.COMMAND, symmetric.COMMAND)
 _DESCRIPTION = "Visual smoothness of polyhedral surfaces: measure it, improve it."
-_EPILOG = (
-    "exit codes: 0 done; 2 wrong usage, unreadable input, existing output or unsuitable mesh "
-    "(one line on stderr says what); 130 interrupted"
-)
-
-
-class CommandParser(argparse.ArgumentParser):
-    """Parser that raises :class:`CommandError` where argparse would print its usage and exit."""
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        # argparse takes -0.5 for a number but -5e-1 for an option; coordinates may be written either way
-        self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
-
-    def error(self, message: str) -> NoReturn:
-        """Refuses the arguments."""
-        raise CommandError(f"{message} ({self.prog} --help lists the options)", self.prog)
 
 
 def build_parser() -> CommandParser:
     """The parser of ``torchfair`` with all subcommands."""
-    parser = CommandParser(prog="torchfair", description=_DESCRIPTION, epilog=_EPILOG, allow_abbrev=False)
+    parser = CommandParser(prog="torchfair", description=_DESCRIPTION, epilog=IN_WORDS, allow_abbrev=False)
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND")
     for command in _COMMANDS:

@@ -1,9 +1,10 @@
-"""The files that a job writes: a mesh, a report and pictures."""
+"""The files that a job writes."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,83 +13,94 @@ from .errors import CommandError
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from ..formfinding import FormResult, JobResult, SymmetricResult
-    from ..topology import Topology
+    from ..io import PolygonMesh
 
 _MESH_FORMATS = (".obj", ".off", ".ply")
 
 
-class Outputs:
-    """Mesh, report and pictures; each is written whole or not at all.
+@dataclass
+class Request:
+    """What a job is to do.
 
-    Args:
-        mesh: The mesh file.
-        folder: Where report and pictures go; by default the folder of the mesh.
-        pictures: Names of the pictures.
+    Attributes:
+        mesh: Where it starts.
+        options: Arguments of the function that does it, by name, beside settings and callback.
+        start: Its first arguments; by default vertices and topology of the mesh.
+        notes: What was decided while reading, in words.
+        report: Entries of ``report.json`` beside those that all jobs have.
     """
 
-    def __init__(self, mesh: Path, folder: str | None, pictures: Sequence[str]) -> None:
-        self.mesh = mesh
-        self.folder = mesh.parent if folder is None else Path(folder)
+    mesh: PolygonMesh
+    options: dict[str, Any]
+    start: Sequence[Any] = ()
+    notes: list[str] = field(default_factory=list)
+    report: dict[str, Any] = field(default_factory=dict)
+
+
+Writer = Callable[[Path, Any, Any, bool], object]
+"""Writes one file from its path, the request, the result, and whether it may replace a file."""
+
+
+class Outputs:
+    """Mesh, report and others; each is written whole or not at all, the mesh first.
+
+    Args:
+        arguments: Of the command.
+        pictures: Writers by name of the file.
+
+    Attributes:
+        mesh, folder, report: Where they go.
+        beside: Writers by path of what is written with the mesh.
+        others: Writers by path of what is written at last.
+        force: Whether files may be replaced.
+    """
+
+    def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
+        self.mesh, self.force = Path(arguments.output), arguments.force
+        self.folder = self.mesh.parent if arguments.results is None else Path(arguments.results)
         self.report = self.folder / "report.json"
-        self.pictures = [self.folder / name for name in pictures]
+        drawn = {} if arguments.no_pictures else pictures
+        self.pictures = {self.folder / name: writer for name, writer in drawn.items()}
+        self.beside: dict[Path, Writer] = {}
+        self.others: dict[Path, Writer] = {}
 
     def paths(self) -> list[Path]:
-        """All files, the mesh first."""
-        return [self.mesh, self.report, *self.pictures]
+        """All files, in the order in which they are written."""
+        return [self.mesh, *self.beside, self.report, *self.pictures, *self.others]
 
-    def check(self, *, force: bool) -> None:
-        """Refuses unknown mesh formats and, without ``force``, files that exist."""
+    def prepare(self) -> None:
+        """Refuses unknown mesh formats and, unless forced, files that exist."""
         if self.mesh.suffix.lower() not in _MESH_FORMATS:
             raise CommandError(f"cannot write '{self.mesh}': choose a name that ends in {', '.join(_MESH_FORMATS)}")
-        refuse_existing(self.paths(), force=force)
+        refuse_existing(self.paths(), force=self.force)
 
     def make_folders(self) -> None:
         """Makes the folders of all files, so that a solve does not end with nowhere to write."""
         for folder in {self.mesh.parent, self.folder}:
             folder.mkdir(parents=True, exist_ok=True)
 
-    def write_mesh_and_report(
-        self,
-        topology: Topology,
-        result: JobResult[Any] | FormResult | SymmetricResult,
-        settings: object,
-        arguments: argparse.Namespace,
-        extra: Mapping[str, Any],
-        *,
-        polylines: Sequence[Tensor] = (),
-    ) -> None:
-        """Writes the mesh, which is what must not be lost, then the report: what all jobs report, and ``extra``.
+    def write_mesh(self, request: Request, result: Any) -> None:
+        """Writes what must not be lost."""
+        from ..io import save_mesh
 
-        Polylines become line elements of an OBJ file.
-        """
-        from ..io import save_mesh, write_report
+        lines = self.polylines(result)
+        save_mesh(self.mesh, result.vertices, result.topology, overwrite=self.force, polylines=lines)
+        self._write(self.beside, request, result)
 
-        run = result.projection
-        save_mesh(self.mesh, result.vertices, topology, overwrite=arguments.force, polylines=polylines)
-        common = {
-            "input": arguments.input,
-            "output": str(self.mesh),
-            "handles": [[float(word) for word in words] for words in arguments.handle],
-            "status": run.status.name.lower(),
-            "message": run.message,
-            "converged": run.status.converged,
-            "scaled_gradient": run.gradient,
-            "recent_fall": run.recent_fall,
-            "solver": run.solver,
-            "notes": result.notes,
-        }
-        write_report(
-            self.report,
-            energies_before=result.before,
-            energies_after=result.after,
-            residuals=run.residuals,
-            history=run.history,
-            settings=settings,
-            timings=run.timings,
-            extra={**common, **extra},
-            overwrite=arguments.force,
-        )
+    def polylines(self, result: Any) -> Sequence[Tensor]:
+        """Vertices of line elements of an OBJ file."""
+        return ()
+
+    def write_others(self, report: Mapping[str, Any], request: Request, result: Any) -> None:
+        """Writes the rest."""
+        from ..io import write_report
+
+        write_report(self.report, report, overwrite=self.force)
+        self._write(self.pictures | self.others, request, result)
+
+    def _write(self, files: Mapping[Path, Writer], request: Request, result: Any) -> None:
+        for path, writer in files.items():
+            writer(path, request, result, self.force)
 
 
 def refuse_existing(paths: Sequence[Path], *, force: bool) -> None:

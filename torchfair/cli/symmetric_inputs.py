@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import MeshFileError
+from .arguments import count
 from .errors import CommandError
 
 if TYPE_CHECKING:
@@ -15,6 +16,18 @@ if TYPE_CHECKING:
 
     from ..io import PolygonMesh
     from ..principal import PrincipalEdges
+
+
+def add_labels(parser: argparse.ArgumentParser) -> None:
+    """The options that say which edges are principal."""
+    labels = parser.add_mutually_exclusive_group()
+    labels.add_argument("--labels", metavar="FILE", help="OBJ or JSON file that marks the principal edges (default: "
+        "INPUT if it marks any, else those along principal directions)")  # fmt: skip
+    labels.add_argument("--seed", nargs=2, type=count, metavar=("V", "W"), help="an edge, by its vertices (counted "
+        "from 0), that is principal; the others follow straight on and in parallel")  # fmt: skip
+    parser.add_argument(
+        "--allow-exceptions", action="store_true", help="leave out vertices where principal edges do not fit together"
+    )
 
 
 def read_principal_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[PrincipalEdges, list[str]]:

@@ -17,6 +17,7 @@ from .job import Promise as Promise
 from .job import Recipe as Recipe
 from .job import Session as Session
 from .job import Stage as Stage
+from .job import job_report as job_report
 from .job import solved as solved
 from .symmetric.design import SymmetricDesign as SymmetricDesign
 from .symmetric.measures import condition_residuals as condition_residuals

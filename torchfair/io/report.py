@@ -4,57 +4,32 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from .atomic import atomic_write_text
 from .json_text import to_json
 
 
-def write_report(
-    path: str | os.PathLike[str],
-    *,
-    energies_before: Mapping[str, float],
-    energies_after: Mapping[str, float],
-    residuals: Sequence[object],
-    history: Sequence[object],
-    settings: object,
-    timings: Mapping[str, float],
-    extra: Mapping[str, Any] | None = None,
-    overwrite: bool = False,
-) -> None:
-    """Writes a report as JSON, whole or not at all.
+def write_report(path: str | os.PathLike[str], entries: Mapping[str, Any], *, overwrite: bool = False) -> None:
+    """Writes a report as JSON, whole or not at all, with ``versions`` beside the entries.
 
-    Keys are sorted, so that reports of equal runs differ in ``timings`` and elapsed times only. Numbers that are
-    not finite are written as null. Besides the arguments the file has ``versions``.
+    Keys are sorted, so that reports of equal runs differ in times only. Numbers that are not finite become null.
 
     Args:
-        path: the file.
-        energies_before: value by key, the key of an energy being its module's name in snake_case.
-        energies_after: likewise.
-        residuals: rows of the residual table, dataclasses or mappings.
-        history: one record per iteration, dataclasses or mappings, or objects with ``as_dict()``.
-        settings: dataclass or mapping.
-        timings: seconds by phase.
-        extra: further entries (input and output file, status, ...).
-        overwrite: whether an existing file may be replaced.
+        path: The file.
+        entries: Of dictionaries, lists, tensors, dataclasses, words and numbers; such as
+            :func:`~torchfair.formfinding.job_report`.
+        overwrite: Whether an existing file may be replaced.
 
     Raises:
-        ValueError: if ``extra`` repeats an entry.
-        MeshFileError: if the file cannot be written.
+        ValueError: the entries have ``versions`` themselves.
+        TypeError: an entry cannot be written as JSON.
+        MeshFileError: the file cannot be written.
     """
-    entries = {
-        "energies": {"before": energies_before, "after": energies_after},
-        "residuals": [_row(row) for row in residuals],
-        "history": [_row(record) for record in history],
-        "settings": settings,
-        "timings": timings,
-        "versions": versions(),
-    }
-    repeated = sorted(entries.keys() & (extra or {}).keys())
-    if repeated:
-        raise ValueError(f"extra entries may not repeat {', '.join(repeated)}")
-    atomic_write_text(path, to_json({**entries, **(extra or {})}), overwrite=overwrite)
+    if "versions" in entries:
+        raise ValueError("versions are added here: leave them out")
+    atomic_write_text(path, to_json({**entries, "versions": versions()}), overwrite=overwrite)
 
 
 def versions() -> dict[str, str]:
@@ -72,8 +47,3 @@ def versions() -> dict[str, str]:
         "torch": torch.__version__,
         "torchfair": __version__,
     }
-
-
-def _row(row: object) -> object:
-    as_dict = getattr(row, "as_dict", None)
-    return as_dict() if callable(as_dict) else row

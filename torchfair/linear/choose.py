@@ -17,6 +17,14 @@ _DENSE_LIMIT = 120
 _RSLAB_LIMIT = 200_000
 _SCIPY_LIMIT = 30_000
 
+_MAKERS: dict[str, Callable[[], LinearSolver]] = {
+    "dense": DenseQR,
+    "scipy": ScipyDirect,
+    "rslab": RslabDirect,
+    "cg": ConjugateGradients,
+}
+SOLVERS = ("auto", *_MAKERS)  # names that may be asked for
+
 
 def choose_solver(name: str, pattern: Pattern) -> LinearSolver:
     """A solver by name, or the fastest that suits the size of the problem.
@@ -30,22 +38,16 @@ def choose_solver(name: str, pattern: Pattern) -> LinearSolver:
     Raises:
         SettingsError: unknown name, or rslab is asked for and cannot be used.
     """
-    makers: dict[str, Callable[[], LinearSolver]] = {
-        "dense": DenseQR,
-        "scipy": ScipyDirect,
-        "rslab": RslabDirect,
-        "cg": ConjugateGradients,
-    }
     if name == "auto":
         name = _automatic(pattern.num_unknowns, pattern.device)
-    if name not in makers:
-        raise SettingsError(f"unknown linear solver '{name}': choose auto, {', '.join(makers)}")
+    if name not in _MAKERS:
+        raise SettingsError(f"unknown linear solver '{name}': choose {', '.join(SOLVERS)}")
     if name == "rslab" and not RslabDirect.available():
         raise SettingsError(
             "linear solver 'rslab' cannot be used: it is not installed (pip install 'torchfair[direct]'), or torchfair "
             "was not imported in the main thread; choose 'scipy' or 'auto'"
         )
-    return makers[name]()
+    return _MAKERS[name]()
 
 
 def _automatic(size: int, device: torch.device) -> str:

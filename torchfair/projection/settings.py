@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from .._numbers import check_count, check_number
 from .._shown import shown
 from ..errors import SettingsError
 from ..linear import LinearSolver
+from ..linear.choose import SOLVERS
+from ..settings import setting
+
+DampingScale = Literal["diagonal", "identity"]
+WhenSettled = Literal["go on", "judge", "stop"]
 
 
 @dataclass(frozen=True)
@@ -16,7 +22,7 @@ class ProjectionSettings:
     """Settings of the damped iteration; all dimensionless.
 
     Attributes:
-        max_iterations: Bound on damped steps, rejected ones included.
+        max_iterations: Bound on the damped steps of a run, rejected ones included.
         initial_damping: First Levenberg-Marquardt parameter, relative to the damping scale.
         damping_scale: ``"diagonal"`` damps each unknown in proportion to its stiffness (the largest diagonal entry of
             ``J^T J`` met so far, More 1978), which makes the iteration independent of the units of the unknowns;
@@ -37,10 +43,11 @@ class ProjectionSettings:
             infinity never tries.
         least_uncorrected_gain: A step that gained less than this, relative to what the model promised, is tried again
             with a second-order correction; minus infinity never tries.
-        time_limit: Seconds, or None.
+        time_limit: After so many seconds the best state so far is returned; None for no limit.
         accuracy: Relative remainder with which an iterative linear solver starts; tightened as the merit
             settles.
-        solver: Name of a linear solver (see ``choose_solver``) or an object with that protocol.
+        solver: Linear solver by name (see ``choose_solver``), ``"auto"`` for the fastest at this size; or an object
+            with that protocol.
 
     Raises:
         SettingsError: a setting is out of its range; names it.
@@ -48,18 +55,18 @@ class ProjectionSettings:
 
     max_iterations: int = 100
     initial_damping: float = 1e-3
-    damping_scale: str = "diagonal"
+    damping_scale: DampingScale = "diagonal"
     gradient_tolerance: float = 1e-12
     step_tolerance: float = 1e-10
     merit_tolerance: float = 1e-9
     patience: int = 3
     patience_when_damped: int = 4
-    when_settled: str = "go on"
+    when_settled: WhenSettled = "go on"
     least_extrapolation: float = 1.25
     least_uncorrected_gain: float = 0.9
-    time_limit: float | None = None
+    time_limit: float | None = setting(None, unit="seconds")
     accuracy: float = 1e-2
-    solver: str | LinearSolver = "auto"
+    solver: str | LinearSolver = setting("auto", choices=SOLVERS)
 
     @classmethod
     def given(cls, settings: object) -> ProjectionSettings:
@@ -71,9 +78,9 @@ class ProjectionSettings:
         return settings
 
     def __post_init__(self) -> None:
-        if self.damping_scale not in ("diagonal", "identity"):
+        if self.damping_scale not in get_args(DampingScale):
             raise SettingsError(f"damping_scale must be 'diagonal' or 'identity', got {self.damping_scale!r}")
-        if self.when_settled not in ("go on", "judge", "stop"):
+        if self.when_settled not in get_args(WhenSettled):
             raise SettingsError(f"when_settled must be 'go on', 'judge' or 'stop', got {self.when_settled!r}")
         check_count("max_iterations", self.max_iterations, least=0)
         check_count("patience", self.patience, least=1)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
 
 from ..._numbers import check_number, is_number
 from ...errors import SettingsError
 from ...projection import ProjectionSettings
+from ...settings import setting
 from ..checks import check_choice, check_weights
 
-BOUNDARIES = ("glide", "fixed", "free")
-PLANAR = ("keep", "quads", "none")
-FORMULATIONS = ("reduced", "lifted")
+Boundary = Literal["glide", "fixed", "free"]
+Planar = Literal["keep", "quads", "none"]
+Formulation = Literal["reduced", "lifted"]
 
 
 def _default_projection() -> ProjectionSettings:
@@ -62,30 +64,32 @@ class FairSettings:
 
     energy_weight: float = 1.0
     closeness_weight: float = 100.0
-    distance_limit: float | None = 0.05
+    distance_limit: float | None = setting(0.05, unit="mean edges")
     fairness_weight: float = 0.3
     handle_weight: float = 1e4
-    boundary: str = "glide"
+    boundary: Boundary = "glide"
     boundary_weight: float = 1e4
-    corner_angle: float = math.radians(40.0)
-    planar: str | tuple[int, ...] = "keep"
+    corner_angle: float = setting(math.radians(40.0), unit="radians")
+    planar: Planar | tuple[int, ...] = "keep"
     planar_tolerance: float = 1e-3
     planarity_weight: float = 1e6
-    smallest_angle: float = math.radians(10.0)
+    smallest_angle: float = setting(math.radians(10.0), unit="radians")
     smallest_area: float = 0.2
     quality_weight: float = 0.1
     smoothing: float = 1e-2
     continuation: tuple[float, ...] = (10.0, 3.0)
-    formulation: str = "reduced"
+    formulation: Formulation = "reduced"
     constraint_weight: float = 1e5
     projection: ProjectionSettings = field(default_factory=_default_projection)
 
     def __post_init__(self) -> None:
-        check_choice(self, "boundary", BOUNDARIES)
-        check_choice(self, "formulation", FORMULATIONS)
+        check_choice(self, "boundary", get_args(Boundary))
+        check_choice(self, "formulation", get_args(Formulation))
         check_weights(self)
-        if isinstance(self.planar, str) and self.planar not in PLANAR:
-            raise SettingsError(f"planar must be one of {', '.join(PLANAR)} or face numbers, got {self.planar!r}")
+        if isinstance(self.planar, str) and self.planar not in get_args(Planar):
+            raise SettingsError(
+                f"planar must be one of {', '.join(get_args(Planar))} or face numbers, got {self.planar!r}"
+            )
         for name in ("smallest_angle", "smallest_area", "planar_tolerance", "corner_angle"):
             check_number(name, getattr(self, name))
         check_number("smoothing", self.smoothing, above=True, finite=True)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 from ...errors import SettingsError
 from ...projection import ProjectionSettings
+from ...settings import setting
 from ..checks import check_choice, check_weights
 
-BOUNDARIES = ("fixed", "glide")
-FORMULATIONS = ("reduced", "lifted")
+Boundary = Literal["fixed", "glide"]
+Formulation = Literal["reduced", "lifted"]
 
 
 def _default_projection() -> ProjectionSettings:
@@ -61,21 +63,21 @@ class FormSettings:
     coarse_fairness_weight: float = 1.0
     umbrella_weight: float = 0.0
     tangential_fairness_weight: float = 0.0
-    boundary: str = "fixed"
+    boundary: Boundary = "fixed"
     boundary_weight: float = 1e4
-    corner_angle: float = math.radians(40.0)
+    corner_angle: float = setting(math.radians(40.0), unit="radians")
     tangent_weight: float = 1e3
     handle_weight: float = 1e4
     coarse_smoothing: float = 0.3
     smoothing: float = 0.05
-    least_angle: float = math.radians(5.0)
-    formulation: str = "reduced"
+    least_angle: float = setting(math.radians(5.0), unit="radians")
+    formulation: Formulation = "reduced"
     constraint_weight: float = 1e3
     projection: ProjectionSettings = field(default_factory=_default_projection)
 
     def __post_init__(self) -> None:
-        check_choice(self, "boundary", BOUNDARIES)
-        check_choice(self, "formulation", FORMULATIONS)
+        check_choice(self, "boundary", get_args(Boundary))
+        check_choice(self, "formulation", get_args(Formulation))
         check_weights(self)
         if not 0.0 < self.smoothing <= self.coarse_smoothing < math.inf:
             raise SettingsError(

@@ -7,6 +7,7 @@ from .promises import Promise as Promise
 from .pulls import Pulls as Pulls
 from .recipe import JobSettings as JobSettings
 from .recipe import Recipe as Recipe
+from .report import job_report as job_report
 from .result import JobResult as JobResult
 from .result import Level as Level
 from .session import Progress as Progress

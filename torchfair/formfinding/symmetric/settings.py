@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 from ..._numbers import check_count, check_number
 from ...projection import ProjectionSettings
+from ...settings import setting
 from ..checks import check_choice, check_weights
 
-BOUNDARIES = ("free", "fixed")
-FORMULATIONS = ("spheres", "eliminated", "lifted")
+Boundary = Literal["free", "fixed"]
+Formulation = Literal["spheres", "eliminated", "lifted"]
 
 
 def _default_projection() -> ProjectionSettings:
@@ -66,17 +68,17 @@ class SymmetricSettings:
     energy_smoothing: float = 1e-2
     saddle_weight: float = 1.0
     saddle_margin: float = 0.05
-    boundary: str = "free"
-    smallest_angle: float = math.radians(10.0)
+    boundary: Boundary = "free"
+    smallest_angle: float = setting(math.radians(10.0), unit="radians")
     tolerance: float = 1e-8
     most_steps: int = 300
     rounds: int = 6
-    formulation: str = "spheres"
+    formulation: Formulation = "spheres"
     projection: ProjectionSettings = field(default_factory=_default_projection)
 
     def __post_init__(self) -> None:
-        check_choice(self, "boundary", BOUNDARIES)
-        check_choice(self, "formulation", FORMULATIONS)
+        check_choice(self, "boundary", get_args(Boundary))
+        check_choice(self, "formulation", get_args(Formulation))
         check_weights(self)
         for name in ("constraint_weight", "tight_weight"):
             check_number(name, getattr(self, name), above=True)

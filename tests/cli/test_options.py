@@ -1,0 +1,172 @@
+"""Options and settings are one: every option is a field, every field an option or hidden for a reason."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from torchfair.cli import fair, form, symmetric
+from torchfair.cli.errors import CommandError
+from torchfair.cli.job_command import JobCommand
+from torchfair.cli.options import HIDDEN, SHORTER
+from torchfair.cli.parser import CommandParser
+from torchfair.settings import SettingField, fields_of
+
+JOBS = [pytest.param(command, id=command.job) for command in (fair.COMMAND, form.COMMAND, symmetric.COMMAND)]
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "command_line.md"
+
+
+def parse(command: JobCommand, *words: str) -> Any:
+    """The settings that words ask for."""
+    parser = CommandParser(prog="x")
+    options = command.options()
+    options.add_to(parser)
+    return options.settings(parser.parse_args(words))
+
+
+def values(settings: Any) -> dict[str, Any]:
+    """All fields with their values, by names with dots."""
+    found = {}
+    for name in fields_of(type(settings)):
+        value = settings
+        for part in name.split("."):
+            value = getattr(value, part)
+        found[name] = value
+    return found
+
+
+def another(field: SettingField) -> str:
+    """A word that gives a field another value, near its default."""
+    shown = field.show(field.default)
+    for word in (*field.symbol.split("|"), "7", "0.75", "3,2"):
+        try:
+            if field.parse(word) != field.default and word != "none":
+                return word
+        except ValueError:
+            continue
+    raise AssertionError(f"{field.name} has one value only, {shown}")
+
+
+@pytest.mark.parametrize("command", JOBS)
+def test_no_options_are_the_defaults_of_the_library(command: JobCommand) -> None:
+    assert parse(command) == command.settings()()
+
+
+@pytest.mark.parametrize("command", JOBS)
+def test_every_field_is_an_option_or_hidden_for_a_reason(command: JobCommand) -> None:
+    options, fields = command.options(), fields_of(command.settings())
+    assert options.names.keys() | options.hidden.keys() == fields.keys()
+    assert not options.names.keys() & options.hidden.keys()
+    assert len(set(options.names.values())) == len(options.names)
+    assert all(len(reason) > 20 for reason in HIDDEN.values())
+    assert HIDDEN.keys() <= fields.keys()
+    assert {*SHORTER, *command.option_names} <= options.names.keys()
+
+
+@pytest.mark.parametrize("command", JOBS)
+def test_every_option_changes_its_field_and_no_other(command: JobCommand) -> None:
+    names, defaults = command.options().names, values(command.settings()())
+    for name, option in names.items():
+        field = fields_of(command.settings())[name]
+        word = {"smoothing": "0.2", "coarse_smoothing": "0.9"}.get(name) or another(field)
+        found = values(parse(command, f"--{option}", word))
+        assert found.pop(name) == field.parse(word) != defaults[name], option
+        assert found == {other: value for other, value in defaults.items() if other != name}
+
+
+@pytest.mark.parametrize("command", JOBS)
+def test_help_says_the_default_in_the_unit_that_is_typed(command: JobCommand) -> None:
+    parser = CommandParser(prog="x")
+    command.options().add_to(parser)
+    text = " ".join(parser.format_help().split())
+    assert "radians" not in text.replace("normals, radians", "")
+    for name, option in command.options().names.items():
+        field = fields_of(command.settings())[name]
+        assert f"--{option} {field.symbol}" in text
+        shown = f"{math.degrees(field.default):g} degrees" if field.unit == "radians" else field.show(field.default)
+        assert f"(default {shown}" in text.partition(f"--{option} {field.symbol} {field.help[0]}")[2][:700], option
+    if command is fair.COMMAND:
+        assert "(default 0.05 mean edges)" in text
+
+
+@pytest.mark.parametrize("command", JOBS)
+def test_options_win_over_the_file(command: JobCommand, tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps({"fairness_weight": 0.7, "handle_weight": 3.0, "projection": {"patience": 9}}))
+    found = parse(command, "--settings", str(path), "--fairness", "0.8", "--solver", "cg")
+    defaults = command.settings()()
+    projection = dataclasses.replace(defaults.projection, patience=9, solver="cg")
+    assert found == dataclasses.replace(defaults, fairness_weight=0.8, handle_weight=3.0, projection=projection)
+
+
+def test_faults_of_options_and_files_are_command_errors(tmp_path: Path) -> None:
+    for words, message in (
+        (["--boundary", "loose"], "--boundary: expected one of glide, fixed, free, got 'loose'"),
+        (["--corner-angle", "200"], "--corner-angle: expected degrees from 0 to 180"),
+        (["--distance", "-1"], "distance_limit .* above 0, got -1.0"),
+        (["--fairness", "-1"], "fairness_weight=-1.0"),
+        (["--continuation", "3,1"], "continuation must hold finite factors above 1"),
+        (["--iterations", "-1"], "max_iterations must be a whole number"),
+    ):
+        with pytest.raises(CommandError, match=message):
+            parse(fair.COMMAND, *words)
+    (tmp_path / "mine.json").write_text('{"boundary": "loose"}')
+    with pytest.raises(CommandError, match=r"mine\.json: boundary: expected one of glide"):
+        parse(fair.COMMAND, "--settings", str(tmp_path / "mine.json"))
+
+
+def test_switches_are_flags_that_can_be_taken_back() -> None:
+    @dataclasses.dataclass(frozen=True)
+    class Settings:
+        """One switch.
+
+        Attributes:
+            curved: Whether it bends.
+        """
+
+        curved: bool = True
+
+    class Command(JobCommand):
+        job = "toy"
+        settings = lambda self: Settings  # noqa: E731
+        function = add_inputs = read = None
+
+    assert parse(Command()).curved is True
+    assert parse(Command(), "--no-curved").curved is False
+    assert parse(Command(), "--no-curved", "--curved").curved is True
+
+
+def table(command: JobCommand) -> str:
+    """What the page of the command line says of the settings of a job."""
+    lines = ["| option | field | default |", "|---|---|---|"]
+    for name, option in command.options().names.items():
+        field = fields_of(command.settings())[name]
+        shown, symbol = field.show(field.default), field.symbol.replace("|", r"\|")
+        unit = {"": "", "radians": " degrees"}.get(field.unit, f" {field.unit}") if shown != "none" else ""
+        lines.append(f"| `--{option} {symbol}` | `{name}` | {shown}{unit} |")
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("command", JOBS)
+def test_the_page_of_the_command_line_has_every_option_and_its_default(command: JobCommand) -> None:
+    page = PAGE.read_text()
+    section, shared = (
+        page.partition(f"## {name}\n")[2].partition("\n## ")[0]
+        for name in (f"torchfair {command.job}", "Jobs: fair, form, symmetric")
+    )
+    assert table(command) in section, f"the table of settings should be\n{table(command)}"
+    parser = CommandParser(prog="x", fill=command._fill)
+    parser.parse_known_args(["x.obj", "-o", "y.obj"])
+    for action in parser._actions[1:]:
+        for option in action.option_strings:
+            assert f"`{option}" in section + shared, option
+
+
+if __name__ == "__main__":
+    for job in (fair.COMMAND, form.COMMAND, symmetric.COMMAND):
+        print(table(job), end="\n\n")

@@ -1,0 +1,141 @@
+"""A subcommand for a job: parser, solve, files and what is said, from settings, inputs, a function and pictures."""
+
+from __future__ import annotations
+
+import argparse
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from .exit_codes import EXIT_INTERRUPTED, EXIT_NOT_REACHED, EXIT_OK, IN_WORDS
+from .options import SettingOptions
+from .outputs import Outputs, Request, Writer
+from .parser import CommandParser
+from .summary import kept_lines, measures_table, missed_lines, note_lines, work_lines
+
+if TYPE_CHECKING:
+    from ..formfinding import JobResult
+
+
+class JobCommand(ABC):
+    """What a job has to say to become a command.
+
+    Attributes:
+        job: Its name.
+        purpose: What it is for, in the list of commands.
+        description: What it does, above its options.
+        option_names: Options of settings that are not named after their fields, by field.
+        pictures: Writers of pictures by name of the file.
+    """
+
+    job: ClassVar[str]
+    purpose: ClassVar[str]
+    description: ClassVar[str]
+    option_names: ClassVar[Mapping[str, str]] = {}
+    pictures: ClassVar[Mapping[str, Writer]] = {}
+
+    # ---- what differs between jobs ---------------------------------------------------------------------
+
+    @abstractmethod
+    def settings(self) -> type[Any]:
+        """The dataclass of settings."""
+
+    @abstractmethod
+    def function(self) -> Callable[..., JobResult[Any]]:
+        """Does the job: takes what :meth:`read` gives, ``settings`` and ``callback``."""
+
+    @abstractmethod
+    def add_inputs(self, parser: argparse.ArgumentParser) -> None:
+        """Adds what is read, beside the settings."""
+
+    @abstractmethod
+    def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
+        """Reads it."""
+
+    def outputs(self, arguments: argparse.Namespace) -> Outputs:
+        """The files to write."""
+        return Outputs(arguments, self.pictures)
+
+    def most_steps(self, settings: Any) -> int:
+        """Where a run ends at the latest, for the display of progress."""
+        return int(settings.projection.max_iterations)
+
+    # ---- what all have in common -----------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """As it is typed."""
+        return f"torchfair {self.job}"
+
+    def add_parser(self, subparsers: Any) -> None:
+        """Adds the command to the others."""
+        parser: CommandParser = subparsers.add_parser(
+            self.job,
+            help=self.purpose,
+            description=self.description,
+            epilog=IN_WORDS,
+            allow_abbrev=False,
+            fill=self._fill,
+        )
+        parser.set_defaults(run=self.run, name=self.name)
+
+    def _fill(self, parser: CommandParser) -> None:
+        self.add_inputs(parser)
+        add = parser.add_argument
+        add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
+        add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
+        add("--no-pictures", action="store_true", help="write no pictures")
+        add("--force", action="store_true", help="replace files that exist")
+        self.options().add_to(parser)
+
+    def options(self) -> SettingOptions[Any]:
+        """The options that are settings."""
+        return SettingOptions(self.settings(), self.job, self.option_names)
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Checks everything that can be checked first, then solves, then writes; the exit code."""
+        settings = self.options().settings(arguments)
+        outputs = self.outputs(arguments)
+        outputs.prepare()
+        request = self.read(arguments, settings)
+        outputs.make_folders()
+        result = self._solve(request, settings)
+        outputs.write_mesh(request, result)
+        missed = missed_lines(result, getattr(arguments, "levels", 0))
+        lines = [
+            *(f"repaired: {sentence}" for sentence in request.mesh.repairs),
+            *note_lines([*request.notes, *result.notes], missed),
+            *measures_table(result.before, result.after),
+            *kept_lines(result),
+            *work_lines(result),
+        ]
+        print("\n".join(lines), flush=True)
+        outputs.write_others(self._report(arguments, request, result, settings), request, result)
+        print("\n".join([*(f"wrote {path}" for path in outputs.paths()), *missed]))
+        return self._exit_code(result, missed)
+
+    def _solve(self, request: Request, settings: Any) -> JobResult[Any]:
+        from ..progress import ProgressDisplay
+
+        job, start = self.function(), request.start or (request.mesh.vertices, request.mesh.topology)
+        with ProgressDisplay(self.most_steps(settings)) as display:
+            return job(*start, **request.options, settings=settings, callback=display)
+
+    def _report(
+        self, arguments: argparse.Namespace, request: Request, result: JobResult[Any], settings: Any
+    ) -> dict[str, Any]:
+        from ..formfinding import job_report
+
+        asked = {name: value for name, value in vars(arguments).items() if name not in _NOT_ASKED and "." not in name}
+        own = {"job": self.job, "request": asked, **request.report}
+        return {**own, **job_report(result, settings)}
+
+    def _exit_code(self, result: JobResult[Any], missed: Sequence[str]) -> int:
+        from ..projection import Status
+
+        if result.projection.status is Status.INTERRUPTED:
+            return EXIT_INTERRUPTED
+        return EXIT_NOT_REACHED if missed else EXIT_OK
+
+
+_NOT_ASKED = ("run", "name", "version")

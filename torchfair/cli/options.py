@@ -1,0 +1,125 @@
+"""Options that are the fields of a settings dataclass."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from ..errors import SettingsError
+from .errors import CommandError
+
+if TYPE_CHECKING:
+    from ..settings import SettingField
+
+S = TypeVar("S")
+
+_DEST = "settings."
+
+SHORTER = {
+    "projection.max_iterations": "iterations",
+    "projection.time_limit": "time-limit",
+    "projection.solver": "solver",
+    "projection.merit_tolerance": "merit-tolerance",
+    "handle_weight": "handle-weight",  # --handle is the handle itself
+}
+_TUNED = "tuned together with the job; a settings file can change it"
+HIDDEN = {
+    f"projection.{name}": _TUNED
+    for name in (
+        "initial_damping",
+        "damping_scale",
+        "gradient_tolerance",
+        "step_tolerance",
+        "patience",
+        "patience_when_damped",
+        "when_settled",
+        "least_extrapolation",
+        "least_uncorrected_gain",
+        "accuracy",
+    )
+}
+
+
+class SettingOptions(Generic[S]):
+    """One option for every field of a settings dataclass, ``--settings FILE`` for all, and the settings they give.
+
+    Defaults are those of the dataclass, help is its docstring. An option has the name of its field, without
+    ``_weight`` unless another field has that name; angles are in degrees.
+
+    Args:
+        kind: The settings dataclass.
+        job: The job that it is for.
+        names: Options with other names, by field.
+
+    Attributes:
+        names: Option by field, without its dashes.
+        hidden: Why a field has no option, by field.
+    """
+
+    def __init__(self, kind: type[S], job: str, names: Mapping[str, str]) -> None:
+        from ..settings import fields_of
+
+        self._kind, self._job, self._fields = kind, job, fields_of(kind)
+        chosen = {**SHORTER, **names}
+        self.hidden = {name: reason for name, reason in HIDDEN.items() if name in self._fields}
+        self.names = {name: chosen.get(name, self._name(name)) for name in self._fields if name not in self.hidden}
+
+    def _name(self, field: str) -> str:
+        short = field.removesuffix("_weight")
+        return (field if short in self._fields and short != field else short).replace("_", "-")
+
+    def add_to(self, parser: argparse.ArgumentParser) -> None:
+        """Adds the options."""
+        group = parser.add_argument_group("settings", "also as fields of a file; options win over it")
+        group.add_argument(
+            "--settings",
+            metavar="FILE",
+            help=f"TOML or JSON file of settings, such as the report.json of an earlier 'torchfair {self._job}', whose "
+            "result is found again",
+        )
+        for name, option in self.names.items():
+            field = self._fields[name]
+            if field.is_switch:
+                action: Any = {"action": argparse.BooleanOptionalAction}
+            else:
+                action = {"type": _read(field), "metavar": field.symbol}
+            group.add_argument(
+                f"--{option}", dest=_DEST + name, default=argparse.SUPPRESS, help=option_help(field), **action
+            )
+
+    def settings(self, arguments: argparse.Namespace) -> S:
+        """The settings that arguments ask for.
+
+        Raises:
+            CommandError: a value is out of its range, or the settings file is at fault.
+        """
+        from ..settings import read_settings
+        from ..settings.files import with_fields
+
+        given = {name.removeprefix(_DEST): value for name, value in vars(arguments).items() if name.startswith(_DEST)}
+        try:
+            file = arguments.settings
+            settings = self._kind() if file is None else read_settings(file, self._kind, job=self._job)
+            return with_fields(settings, given)
+        except SettingsError as error:
+            raise CommandError(str(error)) from None
+
+
+def option_help(field: SettingField) -> str:
+    """What an option means, in words, with its default in the unit that people give."""
+    text = field.help.replace(", radians", "")
+    unit = {"radians": " degrees", "": ""}.get(field.unit, f" {field.unit}")
+    shown = field.show(field.default)
+    default = "" if field.is_switch else f" (default {shown}{'' if shown == 'none' else unit})"
+    return (text.rstrip(".") + default).replace("%", "%%")
+
+
+def _read(field: SettingField) -> Callable[[str], Any]:
+    def read(text: str) -> Any:
+        try:
+            return field.parse(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return read

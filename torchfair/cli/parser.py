@@ -1,0 +1,36 @@
+"""The parser of the command line."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from .errors import CommandError
+
+
+class CommandParser(argparse.ArgumentParser):
+    """Parser that raises :class:`CommandError` where argparse would print its usage and exit.
+
+    Args:
+        fill: Adds the arguments, once they are asked for: options that are made from settings of the library would
+            otherwise import it for every other command.
+    """
+
+    def __init__(self, *args: Any, fill: Callable[[CommandParser], None] | None = None, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        # argparse takes -0.5 for a number but -5e-1 for an option; coordinates may be written either way
+        self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
+        self._fill = fill
+
+    def parse_known_args(self, *args: Any, **kwargs: Any) -> Any:
+        """See argparse."""
+        fill, self._fill = self._fill, None
+        if fill is not None:
+            fill(self)
+        return super().parse_known_args(*args, **kwargs)
+
+    def error(self, message: str) -> NoReturn:
+        """Refuses the arguments."""
+        raise CommandError(f"{message} ({self.prog} --help lists the options)", self.prog)

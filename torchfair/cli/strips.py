@@ -1,0 +1,97 @@
+"""Developable strips along principal edges, as files of ``torchfair symmetric``."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .arguments import non_negative
+from .errors import CommandError
+from .outputs import Request, Writer
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from ..principal import DevelopableStrips
+
+
+def add_strips(parser: argparse.ArgumentParser) -> None:
+    """The options of strips."""
+    add = parser.add_argument
+    add("--strips", type=non_negative, metavar="HEIGHT", help="write strips of this height orthogonal to the mesh "
+        "along the principal edges: strips.obj in space with uv, strips.svg flat")  # fmt: skip
+    add("--depth", type=non_negative, default=0.0, metavar="DEPTH", help="how far strips reach to the other side "
+        "(default 0)")  # fmt: skip
+    add("--millimetres", type=non_negative, default=1.0, metavar="MM", help="length of one unit of INPUT in flat "
+        "drawings (default 1)")  # fmt: skip
+    add("--dxf", action="store_true", help="write strips.dxf too (needs the extra torchfair[dxf])")
+
+
+class StripFiles:
+    """The strips that were asked for; made once, written into several files.
+
+    Args:
+        arguments: Of the command.
+
+    Raises:
+        CommandError: options contradict each other.
+    """
+
+    def __init__(self, arguments: argparse.Namespace) -> None:
+        self._height, self._depth, self._millimetres = arguments.strips, arguments.depth, arguments.millimetres
+        self._dxf = arguments.dxf
+        self._made: DevelopableStrips | None = None
+        if arguments.dxf and self._height is None:
+            raise CommandError("--dxf: give the height of strips by --strips")
+        if self._height is not None and not self._height + self._depth > 0.0:
+            raise CommandError("--strips: a strip needs a height or a depth above 0")
+        if not self._millimetres > 0.0:
+            raise CommandError("--millimetres: expected a number above 0")
+        if arguments.dxf and importlib.util.find_spec("ezdxf") is None:
+            raise CommandError("--dxf needs ezdxf: pip install 'torchfair[dxf]'; SVG files do without")
+
+    def files(self, folder: Path) -> dict[Path, Writer]:
+        """Writers by path; none if no strips were asked for."""
+        if self._height is None:
+            return {}
+        files: dict[Path, Writer] = {folder / "strips.obj": self._solid, folder / "strips.svg": self._flat}
+        return files | ({folder / "strips.dxf": self._drawing} if self._dxf else {})
+
+    def make(self, vertices: Tensor, polylines: list[Tensor], normals: Tensor) -> dict[str, float]:
+        """Makes the strips; how true they are, nothing if none were asked for."""
+        from ..principal import developable_strips
+
+        if self._height is None:
+            return {}
+        self._made = strips = developable_strips(vertices, polylines, normals, self._height, depth=self._depth)
+        return {
+            "strips": len(strips.names),
+            "quads": strips.topology.num_faces,
+            "largest_planarity": float(strips.planarity.max()),
+            "mean_planarity": float(strips.planarity.mean()),
+            "largest_isometry_error": float(strips.isometry_errors.max()),
+            "sheet_width": strips.sheet[0],
+            "sheet_height": strips.sheet[1],
+        }
+
+    @property
+    def _strips(self) -> DevelopableStrips:
+        assert self._made is not None
+        return self._made
+
+    def _solid(self, path: Path, request: Request, result: Any, overwrite: bool) -> None:
+        from ..principal import save_strips_obj
+
+        save_strips_obj(path, self._strips, overwrite=overwrite)
+
+    def _flat(self, path: Path, request: Request, result: Any, overwrite: bool) -> None:
+        from ..principal import save_strips_svg
+
+        save_strips_svg(path, self._strips, millimetres=self._millimetres, overwrite=overwrite)
+
+    def _drawing(self, path: Path, request: Request, result: Any, overwrite: bool) -> None:
+        from ..principal import save_strips_dxf
+
+        save_strips_dxf(path, self._strips, millimetres=self._millimetres, overwrite=overwrite)

@@ -1,0 +1,99 @@
+"""What a job says on the console: measures before and after, and what was promised."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..formfinding import JobResult
+
+LABELS = {
+    "normal_variation": "E",
+    "total_absolute_curvature": "C, the floor of E",
+    "energy_over_curvature": "E/C",
+    "angle_variation": "E'",
+    "area": "area",
+    "smallest_angle_degrees": "smallest angle, degrees",
+    "smallest_area_ratio": "smallest face area over its own at the start",
+    "largest_area_ratio": "largest face area over its own at the start",
+    "flipped_faces": "faces flipped",
+    "largest_distance": "largest distance from the reference",
+    "largest_distance_relative": "... in mean edges",
+    "largest_distance_back": "largest distance back, from the reference",
+    "largest_boundary_distance": "largest distance from boundary curves",
+    "largest_planarity": "largest planarity of kept polygons",
+    "largest_planarity_of_all": "largest planarity of all polygons",
+    "largest_tilt_degrees": "largest angle to a prescribed tangent plane, degrees",
+    "largest_cospherical": "largest residual of spheres, relative",
+    "largest_coplanar": "largest residual of normals, relative",
+    "negative_stars": "saddle stars",
+    "saddle_side_share": "... with their sides right",
+    "crossing_pyramids_negative": "... with a crossing pyramid",
+    "largest_handle_distance": "largest distance of a handle from its target",
+}
+"""Measures in the order of the console; others follow by their names."""
+
+_ONLY_IN_REPORTS = {
+    *("total_mean_curvature", "total_frobenius_curvature", "mean_edge_length", "mean_cospherical", "mean_coplanar"),
+    *("stars", "crossing_pyramids"),
+}
+_IF_ANY = {name for name in LABELS if name.startswith("largest_")} - {"largest_area_ratio", "largest_distance"}
+_IN_PERCENT = ("normal_variation", "total_absolute_curvature", "angle_variation", "area")
+
+
+def measures_table(before: Mapping[str, float], after: Mapping[str, float]) -> list[str]:
+    """One line for every measure of both, with a heading; what is zero twice and was no aim is left out."""
+    names = [name for name in LABELS if name in after]
+    names += [name for name in after if name not in LABELS and name not in _ONLY_IN_REPORTS]
+    names = [name for name in names if name in before and not (name in _IF_ANY and before[name] == after[name] == 0.0)]
+    labels = [LABELS.get(name, name.replace("_", " ")) for name in names]
+    width = max((len(label) for label in labels), default=0)
+    lines = [f"{'':<{width}}  {'before':>10}  {'after':>10}"]
+    for name, label in zip(names, labels, strict=True):
+        change = _percent(before[name], after[name]) if name in _IN_PERCENT else ""
+        lines.append(f"{label:<{width}}  {_number(before[name]):>10}  {_number(after[name]):>10}{change}")
+    return lines
+
+
+def work_lines(result: JobResult[Any]) -> list[str]:
+    """Steps and seconds, of every level and of all."""
+    lines = []
+    if len(result.levels) > 1:
+        for number, level in enumerate(result.levels):
+            lines.append(
+                f"level {number}: {level.topology.num_vertices} vertices, {level.steps} steps in {len(level.runs)} "
+                f"runs, {level.seconds:.2f} s"
+            )
+    runs = len(result.runs)
+    spent = f"{result.steps} steps in {runs} run{'s' * (runs != 1)}, {result.seconds:.2f} s"
+    return [*lines, f"{spent}: {result.message}"]
+
+
+def kept_lines(result: JobResult[Any]) -> list[str]:
+    """What was promised and holds."""
+    return [f"kept: {promise}" for promise in result.promises if promise.holds]
+
+
+def missed_lines(result: JobResult[Any], asked_levels: int) -> list[str]:
+    """What was asked for and is not there."""
+    lines = [str(promise) for promise in result.promises if not promise.holds]
+    if len(result.levels) <= asked_levels:
+        lines.append(f"{len(result.levels) - 1} of {asked_levels} refinements: NOT REACHED; {result.message}")
+    return lines
+
+
+def note_lines(notes: list[str], missed: list[str]) -> list[str]:
+    """Notes but those that are said at the end."""
+    return [f"note: {note}" for note in notes if not any(note.endswith(line) for line in missed)]
+
+
+def _percent(before: float, after: float) -> str:
+    return f"  {100.0 * (after / before - 1.0):+.1f} %" if before else ""
+
+
+def _number(value: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    return str(value) if isinstance(value, int) else f"{value:.5g}"
