@@ -109,7 +109,9 @@ def main() -> None:
     options = parser.parse_args()
     torch.set_num_threads(1)
     opened("fair", 480)  # what a process does only once
-    print(f"{'job':>10} {'size':>5} {'open s':>13} {'move ms':>11} {'slowest':>8} {'rest s':>12} {'lag':>7} {'accepted':>9}")
+    print(
+        f"{'job':>10} {'size':>5} {'open s':>13} {'move ms':>11} {'slowest':>8} {'rest s':>12} {'lag':>7} {'accepted':>9}"
+    )
     rows = []
     for job in options.jobs:
         for size in options.sizes:

@@ -115,7 +115,13 @@ def _plane(origin: Sequence[float], u: Sequence[float], v: Sequence[float]) -> C
 
 
 def _wall(
-    radius: float, depth: float, h: float, origin: Sequence[float], u: Sequence[float], v: Sequence[float], *,
+    radius: float,
+    depth: float,
+    h: float,
+    origin: Sequence[float],
+    u: Sequence[float],
+    v: Sequence[float],
+    *,
     inwards: bool,
 ) -> Sheet:
     """A round wall of circles in the plane of u and v that rise from ``origin`` along u x v, cut open at one line."""
