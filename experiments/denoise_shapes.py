@@ -33,8 +33,8 @@ TABLE = "table.md"
 METHODS = ("noisy", "denoise", "curved", "bilateral", "taubin")
 SHAPES, NOISES = ("block", "cylinder", "sphere", "saddle", "blend"), ("normal", "all")
 TAUBIN_ROUNDS = (5, 10, 20, 50)
-BILATERAL_WIDTHS = (0.2, 0.3, 0.45, 0.65)
-BILATERAL_ROUNDS = (5, 20, 40)
+BILATERAL_WIDTHS = (0.2, 0.3, 0.45)
+BILATERAL_ROUNDS = (5, 20)
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ class DenoiseRecipe(Recipe[DenoiseSettings]):
     def follower(self, state: State) -> Stage:
         """The same."""
         version = (self.pulls.version, self.settings)
-        return Stage("denoise", state, self.terms, version, self.settings.projection, self.fixed)
+        return Stage("denoise", state, self.terms, version, self.settings.run(self.start.numel()), self.fixed)
 
     def terms(self) -> list[ElementTerm]:
         """``1/2 sum |x - x_noisy|^2 + strength noise sum (sqrt((l l*)^2 + eps^2) - eps)``, and faces unfold."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..._numbers import check_number
 from ...errors import SettingsError
@@ -10,6 +10,7 @@ from ...projection import ProjectionSettings
 from ..checks import check_choice, check_weights
 
 BOUNDARIES = ("free", "fixed")
+_DIRECT_LIMIT = 100_000  # unknowns; above, factors cost more time and memory than iterations
 
 
 def _default_projection() -> ProjectionSettings:
@@ -21,7 +22,6 @@ def _default_projection() -> ProjectionSettings:
         patience=2,
         when_settled="judge",
         accuracy=3e-2,
-        solver="cg",
     )
 
 
@@ -39,7 +39,8 @@ class DenoiseSettings:
         curved_smoothing: The same with ``curved``.
         unfolding_weight: Weight of inequalities that turn folded faces back; 0 leaves them folded.
         handle_weight: Weight of the squared distance of handles from their targets.
-        projection: Iterations, tolerances, damping and linear solver.
+        projection: Iterations, tolerances, damping and linear solver; ``"auto"`` takes conjugate gradients above a
+            hundred thousand unknowns, which depend on rounding (of the unit, say) a little.
 
     Raises:
         SettingsError: a setting is out of its range; names it.
@@ -65,3 +66,8 @@ class DenoiseSettings:
         for name in ("smoothing", "curved_smoothing"):
             check_number(name, getattr(self, name), above=True, finite=True)
         check_weights(self)
+
+    def run(self, unknowns: int) -> ProjectionSettings:
+        """Settings of the iteration for a number of unknowns."""
+        iterative = self.projection.solver == "auto" and unknowns > _DIRECT_LIMIT
+        return replace(self.projection, solver="cg") if iterative else self.projection

@@ -34,7 +34,7 @@ class Sides:
     def of(cls, vertices: Tensor, topology: Topology, near: Neighbourhoods) -> Sides:
         """Of a mesh (V, 3), which may be noisy."""
         vectors, areas = smoothed_area_vectors(vertices, topology, near)
-        counts = near.sums(topology.valences.to(areas))
+        counts = near.sums(torch.bincount(topology.corners, minlength=topology.num_vertices).to(areas))
         gathered = torch.cat([vectors, areas[:, None], counts[:, None]], dim=1)[topology.corners]
         total = gathered.new_zeros(topology.num_faces, 5).index_add_(0, topology.corner_faces, gathered)
         length = vector_norm(total[:, :3], dim=1)
