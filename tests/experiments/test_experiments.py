@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,7 +17,8 @@ import torch
 from helpers import DOUBLE
 
 from torchfair import Topology
-from torchfair.geometry import angle_defects, planarity
+from torchfair.formfinding.denoise.measures import volume
+from torchfair.geometry import angle_defects, corner_angles, planarity
 from torchfair.io import load_mesh
 
 FOLDER = Path(__file__).parents[2] / "experiments"
@@ -46,6 +48,29 @@ def test_energy_of_principal_meshes_converges_to_c_and_that_of_others_does_not(r
     mesh = load_mesh(tmp_path / "out" / "principal_fine.obj")
     assert mesh.topology.is_quadrangular
     assert load_mesh(tmp_path / "out" / "irregular.obj").topology.is_triangular
+
+
+def test_denoising_keeps_edges_where_filters_do_not(run: Run, tmp_path: Path) -> None:
+    report = run("denoise_shapes", "--faces", "1200", "--shapes", "block", "cylinder", "--levels", "0.3",
+                 "--noises", "all", "--repeats", "1")  # fmt: skip
+    for row in report["rows"]:
+        assert row["denoise"]["degrees"] < 0.6 * min(row["bilateral"]["degrees"], row["taubin"]["degrees"])
+        assert row["denoise"]["flipped"] <= 0.02 * row["noisy"]["flipped"]
+        assert abs(row["denoise"]["volume"]) < 0.04
+        assert row["denoise"]["estimate"] == pytest.approx(0.3, rel=0.15)
+    assert len((tmp_path / "out" / "table.md").read_text().splitlines()) == 4
+
+
+@pytest.mark.parametrize("name", ["block", "cylinder"])
+def test_bodies_to_denoise_are_closed_and_evenly_meshed(script: Callable[[str], ModuleType], name: str) -> None:
+    shapes = script("_denoise_shapes")
+    vertices, topology = getattr(shapes, name)(3000)
+    assert not bool(topology.is_boundary_vertex.any())
+    assert topology.num_vertices - topology.num_edges + topology.num_faces == {"block": -2, "cylinder": 2}[name]
+    assert topology.num_faces == pytest.approx(3000, rel=0.1)
+    assert float(corner_angles(vertices, topology).min()) > math.radians(20.0)
+    inside = {"block": 9.0 - math.pi * (0.35**2 + 2 * 0.4**2), "cylinder": 2.5 * math.pi}[name]
+    assert volume(vertices, topology) == pytest.approx(inside, rel=0.01)
 
 
 def test_parameter_lines_of_the_moulding_surface_are_principal(script: Callable[[str], ModuleType]) -> None:

@@ -1,5 +1,9 @@
 """Formfinding jobs: short recipes over energies, constraints and guided projection (paper section 5)."""
 
+from .denoise.noise import noise_level as noise_level
+from .denoise.recipe import DenoiseRecipe as DenoiseRecipe
+from .denoise.recipe import denoise as denoise
+from .denoise.settings import DenoiseSettings as DenoiseSettings
 from .fair.recipe import FairRecipe as FairRecipe
 from .fair.recipe import minimise_normal_variation as minimise_normal_variation
 from .fair.settings import FairSettings as FairSettings

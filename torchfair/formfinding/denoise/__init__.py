@@ -1,0 +1,1 @@
+"""The job that removes noise: the nearby mesh of small E."""
