@@ -10,14 +10,15 @@ from typing import Any
 
 import pytest
 
-from torchfair.cli import fair, form, symmetric
+from torchfair.cli import denoise, fair, form, symmetric
 from torchfair.cli.errors import CommandError
 from torchfair.cli.job_command import JobCommand
 from torchfair.cli.options import HIDDEN, SHORTER
 from torchfair.cli.parser import CommandParser
 from torchfair.settings import SettingField, fields_of
 
-JOBS = [pytest.param(command, id=command.job) for command in (fair.COMMAND, form.COMMAND, symmetric.COMMAND)]
+COMMANDS = (fair.COMMAND, form.COMMAND, symmetric.COMMAND, denoise.COMMAND)
+JOBS = [pytest.param(command, id=command.job) for command in COMMANDS]
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "command_line.md"
 
 
@@ -73,8 +74,12 @@ def test_every_option_changes_its_field_and_no_other(command: JobCommand) -> Non
     names, defaults = command.options().names, values(command.settings()())
     for name, option in names.items():
         field = fields_of(command.settings())[name]
-        word = {"smoothing": "0.2", "coarse_smoothing": "0.9"}.get(name) or another(field)
-        found = values(parse(command, f"--{option}", word))
+        if field.is_switch:
+            word, words = str(not field.default).lower(), [f"--{'no-' if field.default else ''}{option}"]
+        else:
+            word = {"smoothing": "0.2", "coarse_smoothing": "0.9"}.get(name) or another(field)
+            words = [f"--{option}", word]
+        found = values(parse(command, *words))
         assert found.pop(name) == field.parse(word) != defaults[name], option
         assert found == {other: value for other, value in defaults.items() if other != name}
 
@@ -87,6 +92,9 @@ def test_help_says_the_default_in_the_unit_that_is_typed(command: JobCommand) ->
     assert "radians" not in text.replace("normals, radians", "")
     for name, option in command.options().names.items():
         field = fields_of(command.settings())[name]
+        if field.is_switch:
+            assert f"--{option}, --no-{option} {field.help[0]}" in text
+            continue
         assert f"--{option} {field.symbol}" in text
         shown = f"{math.degrees(field.default):g} degrees" if field.unit == "radians" else field.show(field.default)
         assert f"(default {shown}" in text.partition(f"--{option} {field.symbol} {field.help[0]}")[2][:700], option
@@ -97,11 +105,12 @@ def test_help_says_the_default_in_the_unit_that_is_typed(command: JobCommand) ->
 @pytest.mark.parametrize("command", JOBS)
 def test_options_win_over_the_file(command: JobCommand, tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
-    path.write_text(json.dumps({"fairness_weight": 0.7, "handle_weight": 3.0, "projection": {"patience": 9}}))
-    found = parse(command, "--settings", str(path), "--fairness", "0.8", "--solver", "cg")
+    file = {"boundary": "fixed", "handle_weight": 3.0, "projection": {"patience": 9, "solver": "scipy"}}
+    path.write_text(json.dumps(file))
+    found = parse(command, "--settings", str(path), "--handle-weight", "4", "--solver", "cg")
     defaults = command.settings()()
     projection = dataclasses.replace(defaults.projection, patience=9, solver="cg")
-    assert found == dataclasses.replace(defaults, fairness_weight=0.8, handle_weight=3.0, projection=projection)
+    assert found == dataclasses.replace(defaults, boundary="fixed", handle_weight=4.0, projection=projection)
 
 
 def test_faults_of_options_and_files_are_command_errors(tmp_path: Path) -> None:
@@ -148,7 +157,8 @@ def table(command: JobCommand) -> str:
         field = fields_of(command.settings())[name]
         shown, symbol = field.show(field.default), field.symbol.replace("|", r"\|")
         unit = {"": "", "radians": " degrees"}.get(field.unit, f" {field.unit}") if shown != "none" else ""
-        lines.append(f"| `--{option} {symbol}` | `{name}` | {shown}{unit} |")
+        words = f"`--{option}`, `--no-{option}`" if field.is_switch else f"`--{option} {symbol}`"
+        lines.append(f"| {words} | `{name}` | {shown}{unit} |")
     return "\n".join(lines)
 
 
@@ -157,7 +167,7 @@ def test_the_page_of_the_command_line_has_every_option_and_its_default(command: 
     page = PAGE.read_text()
     section, shared = (
         page.partition(f"## {name}\n")[2].partition("\n## ")[0]
-        for name in (f"torchfair {command.job}", "Jobs: fair, form, symmetric")
+        for name in (f"torchfair {command.job}", "Jobs: fair, form, symmetric, denoise")
     )
     assert table(command) in section, f"the table of settings should be\n{table(command)}"
     parser = CommandParser(prog="x", fill=command._fill)
@@ -168,5 +178,5 @@ def test_the_page_of_the_command_line_has_every_option_and_its_default(command: 
 
 
 if __name__ == "__main__":
-    for job in (fair.COMMAND, form.COMMAND, symmetric.COMMAND):
+    for job in COMMANDS:
         print(table(job), end="\n\n")

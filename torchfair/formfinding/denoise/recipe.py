@@ -28,7 +28,7 @@ class DenoiseRecipe(Recipe[DenoiseSettings]):
         super().__init__(vertices, topology, settings or DenoiseSettings())
         self._near = Neighbourhoods.of(self.topology)
         self._sides = Sides.of(self.start, self.topology, self._near)
-        if self.settings.noise is None:
+        if isinstance(self.settings.noise, str):
             self.noise = noise_level(self.start, self.topology, self._near)
             self.notes.append(f"noise estimated at {self.noise:.3g} mean edge lengths")
         else:

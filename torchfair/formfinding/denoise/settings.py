@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
 
 from ..._numbers import check_number
 from ...errors import SettingsError
 from ...projection import ProjectionSettings
+from ...settings import setting
 from ..checks import check_choice, check_weights
 
-BOUNDARIES = ("free", "fixed")
+Boundary = Literal["free", "fixed"]
 _DIRECT_LIMIT = 100_000  # unknowns; above, factors cost more time and memory than iterations
 
 
@@ -30,7 +32,7 @@ class DenoiseSettings:
     """What :func:`denoise` takes for noise. One setting serves all meshes.
 
     Attributes:
-        noise: Standard deviation of the noise across the surface, in the unit of the input; None estimates it.
+        noise: Standard deviation of the noise across the surface, in the unit of the input; ``"auto"`` estimates it.
         strength: Weight of E over the noise: above 1 smooths more than the noise asks for.
         curved: Whether the surface is curved nearly everywhere, as organic shapes are: the absolute value is rounded
             by ``curved_smoothing``, so that faces bend evenly and do not gather into facets.
@@ -46,23 +48,23 @@ class DenoiseSettings:
         SettingsError: a setting is out of its range; names it.
     """
 
-    noise: float | None = None
+    noise: float | Literal["auto"] = "auto"
     strength: float = 1.0
     curved: bool = False
-    boundary: str = "free"
-    smoothing: float = 3e-3
-    curved_smoothing: float = 2e-2
+    boundary: Boundary = "free"
+    smoothing: float = setting(3e-3, unit="mean edges")
+    curved_smoothing: float = setting(2e-2, unit="mean edges")
     unfolding_weight: float = 100.0
     handle_weight: float = 1e4
     projection: ProjectionSettings = field(default_factory=_default_projection)
 
     def __post_init__(self) -> None:
-        if self.noise is not None:
-            check_number("noise (or None)", self.noise, finite=True)
+        if self.noise != "auto":
+            check_number("noise (or 'auto')", self.noise, finite=True)
         check_number("strength", self.strength, finite=True)
         if not isinstance(self.curved, bool):
             raise SettingsError(f"curved must be True or False, got {self.curved!r}")
-        check_choice(self, "boundary", BOUNDARIES)
+        check_choice(self, "boundary", get_args(Boundary))
         for name in ("smoothing", "curved_smoothing"):
             check_number(name, getattr(self, name), above=True, finite=True)
         check_weights(self)

@@ -1,0 +1,58 @@
+"""``torchfair denoise``: removes noise from a scanned mesh and keeps its edges."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from .inputs import add_repair, read_input
+from .job_command import JobCommand
+from .outputs import Request, Writer
+
+if TYPE_CHECKING:
+    from ..formfinding import JobResult, Level
+
+
+def _overview(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
+    from ..viewing import picture_before_after
+
+    picture_before_after(path, request.mesh.vertices, result.vertices, result.topology, overwrite=overwrite)
+
+
+class DenoiseCommand(JobCommand):
+    """Removes noise."""
+
+    job = "denoise"
+    purpose = "remove noise from a scanned mesh, and keep its edges"
+    description = (
+        "Moves the vertices of a noisy mesh as little as makes its normal variation E small: faces become flat and "
+        "edges stay sharp. Estimates how much noise there is. Writes the mesh, report.json and a picture of before and "
+        "after. Best on bodies of flat and singly curved faces; --curved for organic shapes."
+    )
+    pictures: ClassVar[Mapping[str, Writer]] = {"before_after.png": _overview}
+
+    def settings(self) -> type[Any]:
+        """See the base class."""
+        from ..formfinding import DenoiseSettings
+
+        return DenoiseSettings
+
+    def function(self) -> Callable[..., JobResult[Level]]:
+        """See the base class."""
+        from ..formfinding import denoise
+
+        return denoise
+
+    def add_inputs(self, parser: argparse.ArgumentParser) -> None:
+        """A mesh."""
+        parser.add_argument("input", metavar="INPUT", help="mesh file, or a built-in example:NAME")
+        add_repair(parser)
+
+    def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
+        """See the base class."""
+        return Request(read_input(arguments.input, arguments.repair), {})
+
+
+COMMAND = DenoiseCommand()
