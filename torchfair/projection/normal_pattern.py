@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,6 +18,8 @@ from .layout import Layout
 from .products import ProductSum
 
 Ints = np.ndarray
+
+_PORTION = 200_000  # products
 
 
 class NormalPattern:
@@ -160,16 +162,21 @@ class NormalPattern:
         values = self._like.new_zeros(self.lower.rows.size) if self._products is None else self._products(jacobians)
         return values if self._constant is None else values.add_(self._constant)
 
-    def repeated_sum(self, count: int) -> Callable[[Sequence[Tensor]], Tensor]:
-        """:meth:`assemble` for ``count`` members at once, see :meth:`ProductSum.repeated`; values (nnz, count)."""
-        products = None if self._products is None else self._products.repeated(count)
+    def assemble_members(self, jacobians: Sequence[Tensor], members: int) -> Tensor:
+        """(members, nnz) the same for the members of a batch, whose elements lie one after the other.
 
-        def assemble(jacobians: Sequence[Tensor]) -> Tensor:
-            shape = (self.lower.rows.size, count)
-            values = self._like.new_zeros(shape) if products is None else products(jacobians).view(shape)
-            return values if self._constant is None else values.add_(self._constant[:, None])
-
-        return assemble
+        Few members at a time: their products stay in the cache.
+        """
+        parts = [jacobian.view(*jacobian.shape[:2], members, -1) for jacobian in jacobians]
+        shape = (members, self.lower.rows.size)
+        values = self._like.new_zeros(shape) if self._products is None else self._like.new_empty(shape)
+        if self._products is not None:
+            portion = max(1, _PORTION // max(1, self._products.length))
+            for start in range(0, members, portion):
+                some = [part[:, :, start : start + portion].transpose(2, 3).flatten(2) for part in parts]
+                out = values[start : start + portion]
+                out.T.copy_(self._products(some, out.shape[0]).view(-1, out.shape[0]))
+        return values if self._constant is None else values.add_(self._constant)
 
 
 def _place(start: Ints, stride: Ints, i: Ints | int, j: Ints | int) -> Ints:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 
 import torch
@@ -38,26 +37,26 @@ class ProductSum:
             parts = [torch.ones(s) if f is None else f for s, f in zip(self._shapes, factors, strict=True)]
             weights = torch.cat([part.reshape(-1).to(like) for part in parts])
         self._matrix = scatter_matrix(index, size, like.dtype, weights)
-        self._count, self._weighted = 1, weights is not None
         # Kept between calls: at this size, fresh memory costs more than the arithmetic.
         self._products = like.new_empty(index.shape[0])
 
-    def repeated(self, count: int) -> ProductSum:
-        """The same for members with equal elements.
+    @property
+    def length(self) -> int:
+        """Number of products."""
+        return self._matrix.shape[1]
 
-        Takes Jacobians ``(m, K, n * count)``, the members of an element one after the other; returns ``(size, count)``.
+    def __call__(self, jacobians: Sequence[Tensor], count: int = 1) -> Tensor:
+        """(size,) sums for element Jacobians ``(m, K, n)``.
+
+        For ``count`` members with equal elements, Jacobians ``(m, K, n * count)``, the members of an element one after
+        the other: sums (size, count).
         """
-        result = copy.copy(self)
-        result._count = count
-        result._products = self._products.new_empty(self._products.shape[0] // self._count * count)
-        return result
-
-    def __call__(self, jacobians: Sequence[Tensor]) -> Tensor:
-        """(size,) sums for element Jacobians ``(m, K, n)``."""
+        if self._products.shape[0] < self.length * count:
+            self._products = self._products.new_empty(self.length * count)
         start = 0
         for firsts, shape, jacobian in zip(self._firsts, self._shapes, jacobians, strict=True):
-            stop = start + shape.numel() * self._count
-            products = self._products[start:stop].view(shape[0], shape[1] * self._count)
+            stop = start + shape.numel() * count
+            products = self._products[start:stop].view(shape[0], shape[1] * count)
             start = stop
             row = 0
             for p, first in enumerate(firsts):
@@ -66,15 +65,6 @@ class ProductSum:
                 for component in jacobian[1:]:
                     out.addcmul_(component[p], component[first : p + 1])
                 row += p + 1 - first
-        if self._count == 1:
-            total: Tensor = self._matrix @ self._products
-            return total
-        # Several times as fast as the product of the sparse matrix with a dense one.
-        return torch.nn.functional.embedding_bag(
-            self._matrix.col_indices(),
-            self._products.view(-1, self._count),
-            self._matrix.crow_indices(),
-            mode="sum",
-            per_sample_weights=self._matrix.values() if self._weighted else None,
-            include_last_offset=True,
-        )
+        products = self._products[:start]
+        total: Tensor = self._matrix @ (products if count == 1 else products.view(-1, count))
+        return total

@@ -26,7 +26,6 @@ class RepeatedPattern:
 
     def __init__(self, single: NormalPattern, layout: Layout) -> None:
         self._single, self._members = single, layout.members
-        self._sum = single.repeated_sum(layout.members)
         unknowns, size = layout.member_unknowns().cpu().numpy(), single.lower.size
         member, local = np.empty((2, unknowns.size), np.int64)
         member[unknowns.ravel()], local[unknowns.ravel()] = np.divmod(np.arange(unknowns.size), size)
@@ -41,8 +40,5 @@ class RepeatedPattern:
 
     def assemble(self, jacobians: Sequence[Tensor]) -> Tensor:
         """(nnz,) values of the lower triangle for element Jacobians ``(m, K, n)``, n elements of all members."""
-        inner = [
-            part.view(*part.shape[:2], self._members, -1).transpose(2, 3).reshape(part.shape) for part in jacobians
-        ]
-        values = self._sum(inner).T.reshape(-1)
+        values = self._single.assemble_members(jacobians, self._members).view(-1)
         return values if self._order is None else values[self._order]
