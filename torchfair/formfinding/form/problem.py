@@ -17,7 +17,9 @@ from ...linear import Factor, factorise
 from ...normalisation import Normalisation
 from ...projection import ElementTerm
 from ...topology import Topology
+from ..job.pulls import Pulls
 from .boundary_track import BoundaryTrack
+from .rim import Rim
 from .settings import FormSettings
 
 _EXACTLY = 10.0  # weight of tangent planes in the end, over that on the way
@@ -32,37 +34,26 @@ class FormProblem:
     Args:
         topology: Triangle mesh.
         normalisation: To unit mean edge length.
-        track: Boundary vertices and their curves, in units of the input.
-        normals: (V, 3) prescribed unit normals of boundary vertices; zero where none is.
-        handles: (n,) vertices that are pulled.
-        targets: (n, 3) where to, normalised.
+        rim: What is asked along the boundary.
+        pulls: Handles and held vertices.
         settings: Weights.
-
-    Attributes:
-        fixed: (V,) bool.
     """
 
     def __init__(
-        self,
-        topology: Topology,
-        normalisation: Normalisation,
-        track: BoundaryTrack,
-        normals: Tensor,
-        handles: Tensor,
-        targets: Tensor,
-        settings: FormSettings,
+        self, topology: Topology, normalisation: Normalisation, rim: Rim, pulls: Pulls, settings: FormSettings
     ) -> None:
-        self.topology, self.settings = topology, settings
-        self.handles, self.targets = handles, targets
-        gliding = settings.boundary == "glide"
-        self.fixed = staying_vertices(topology, track, settings)
-        self.normals = normals
-        self._conditions = c.handle_terms(handles, targets, weight=settings.handle_weight)
-        if settings.umbrella_weight:
-            self._conditions += c.interior_fairness_terms(topology, weight=settings.umbrella_weight)
-        self._in_space = [*self._gliding(track, normalisation)] if gliding else []
-        if settings.tangential_fairness_weight:
-            self._in_space += c.tangential_fairness_terms(topology, weight=settings.tangential_fairness_weight)
+        self.topology, self.settings, self.pulls, self.normals = topology, settings, pulls, rim.normals
+        self._normalisation, self._track = normalisation, rim.track
+
+    @property
+    def fixed(self) -> Tensor:
+        """(V,) bool, vertices that do not move."""
+        return staying_vertices(self.topology, self._track, self.settings) | self.pulls.held
+
+    @property
+    def glides(self) -> bool:
+        """Whether boundary vertices slide along their curves."""
+        return self.settings.boundary == "glide"
 
     def smoothing(self, vertices: Tensor, fraction: float) -> float:
         """Smoothing that is the given fraction of the mean absolute curvature of a star."""
@@ -77,9 +68,10 @@ class FormProblem:
         Raw normals of a mesh that is not smooth yet cross each other and would drive vertices together.
         """
         ways = self._evened(vertex_normals(vertices, self.topology))
-        pull = self.targets - vertices[self.handles]
+        handles = self.pulls.vertices
+        pull = self.pulls.aims[handles] - vertices[handles]
         length = torch.linalg.vector_norm(pull, dim=1, keepdim=True)
-        ways[self.handles] = torch.where(length > 0.0, pull / length, ways[self.handles])
+        ways[handles] = torch.where(length > 0.0, pull / length, ways[handles])
         return ways
 
     def height_terms(
@@ -87,7 +79,8 @@ class FormProblem:
     ) -> list[ElementTerm]:
         """Terms whose unknowns are heights along the directions; the boundary stays."""
         others = self._others(vertices, fairness_weight, correct=correct)
-        terms = [*self._curvature(smoothing), *self._bending(smoothing), *others]
+        pulls = self.pulls.terms(weight=self.settings.handle_weight, as_data=True)
+        terms = [*self._curvature(smoothing), *self._bending(smoothing), *others, *pulls]
         return [c.along_directions(term, vertices, directions) for term in terms]
 
     def _evened(self, normals: Tensor) -> Tensor:
@@ -115,7 +108,8 @@ class FormProblem:
     def terms(self, vertices: Tensor, smoothing: float) -> list[ElementTerm]:
         """Terms whose unknowns are the vertices, or those of the lifted formulation; ``vertices`` are the start."""
         settings = self.settings
-        others = [*self._others(vertices, settings.fairness_weight), *self._in_space]
+        pulls = self.pulls.terms(weight=settings.handle_weight)
+        others = [*self._others(vertices, settings.fairness_weight), *pulls, *self._spreading()]
         if settings.formulation == "reduced":
             return [*self._curvature(smoothing), *self._bending(smoothing), *others]
         lifted = lifted_absolute_curvature_terms(
@@ -126,7 +120,7 @@ class FormProblem:
         )
         return [*lifted, *others]
 
-    @cached_property
+    @property
     def fixed_in_space(self) -> Tensor:
         """(V,) bool, vertices that stay while others are spread.
 
@@ -186,9 +180,13 @@ class FormProblem:
         """Fairness and conditions, the former and tangent planes as seen from ``vertices``."""
         return [
             *c.even_fairness_terms(vertices, self.topology, weight=fairness_weight),
-            *self._conditions,
+            *self._umbrellas(),
             *self._tangent_planes(vertices, correct),
         ]
+
+    def _umbrellas(self) -> list[ElementTerm]:
+        weight = self.settings.umbrella_weight
+        return c.interior_fairness_terms(self.topology, weight=weight) if weight else []
 
     def _tangent_planes(self, vertices: Tensor, correct: bool) -> list[ElementTerm]:
         chosen = torch.nonzero((self.normals != 0.0).any(1)).squeeze(1)
@@ -201,17 +199,31 @@ class FormProblem:
         targets = c.BoundaryNormals.of(vertices, self.topology).star_targets(self.normals)
         return c.tangent_plane_terms(self.topology, chosen, targets[chosen], weight=weight)
 
-    def _gliding(self, track: BoundaryTrack, normalisation: Normalisation) -> list[ElementTerm]:
+    def _spreading(self) -> list[ElementTerm]:
+        """What only vertices that move in space need: they slide along curves, and over the surface."""
+        settings, terms = self.settings, []
+        if self._feet is not None:
+            terms += c.gliding_terms(self._feet, weight=settings.boundary_weight)
+            terms += c.boundary_fairness_terms(self.topology, self._track.corners, weight=settings.fairness_weight)
+        if settings.tangential_fairness_weight:
+            terms += c.tangential_fairness_terms(self.topology, weight=settings.tangential_fairness_weight)
+        return terms
+
+    @cached_property
+    def _feet(self) -> c.CurveFeet | None:
+        """Of gliding vertices on their curves."""
+        track = self._track
         spans = [span for curve in track.curves for span in curve.spans()]
-        if not spans:
-            return []
+        if self.settings.boundary == "fixed" or not spans:
+            return None
         vertices = torch.nonzero(self.topology.is_boundary_vertex & ~track.corners).squeeze(1)
-        curves = SplineCurves([normalisation.apply(span.points) for span in spans], [span.closed for span in spans])
-        settings = self.settings
-        return [
-            *c.gliding_terms(c.CurveFeet(curves, vertices, track.spans(vertices)), weight=settings.boundary_weight),
-            *c.boundary_fairness_terms(self.topology, track.corners, weight=settings.fairness_weight),
-        ]
+        normalise = self._normalisation.apply
+        curves = SplineCurves([normalise(span.points) for span in spans], [span.closed for span in spans])
+        return c.CurveFeet(curves, vertices, track.spans(vertices))
+
+    def forget(self) -> None:
+        """Makes searches for closest points anew."""
+        self.__dict__.pop("_feet", None)
 
 
 def staying_vertices(topology: Topology, track: BoundaryTrack, settings: FormSettings) -> Tensor:
