@@ -66,8 +66,10 @@ def form_promises(
 
     Args:
         settings: Of the job.
-        before, after: Measures of the start and of the mesh.
-        handles, normals: Whether there are any.
+        before: Measures of the start.
+        after: Measures of the mesh.
+        handles: Whether there are any.
+        normals: Whether any are prescribed.
     """
     edge, promises = before["mean_edge_length"], []
     if not (handles or normals or before["largest_boundary_distance"] > _ON_THE_CURVES * edge):

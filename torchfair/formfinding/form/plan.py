@@ -43,14 +43,13 @@ class FormPlan(Plan):
             yield from self._from_nearby()
         else:
             yield from self._from_afar()
-        if problem.has_tangent_planes:
-            # Patches at the boundary are frozen in the plane, so they are made anew.
-            for _ in range(_TANGENT_ROUNDS):
-                vertices = self.state["vertices"]
-                yield along_normals(problem, vertices, settings.smoothing, settings.fairness_weight, correct=True)
+        yield from self._tangent_planes()
 
     def best(self) -> State:
         """The last state, or that from coarse smoothings where the last one is not better."""
+        return self._better_of_both()
+
+    def _better_of_both(self) -> State:
         if self._rival is None or self._is_better(self.state, self._rival):
             return self.state
         return self._rival
@@ -67,7 +66,7 @@ class FormPlan(Plan):
             fine = along_normals(problem, self._start, last, settings.fairness_weight)
             self._rival = self.state
             yield fine
-            best, other = self.best(), self._rival
+            best, other = self._better_of_both(), self._rival
             self.state, self._rival = best, None
             if best is not other:
                 in_the_end = [last]
@@ -86,6 +85,13 @@ class FormPlan(Plan):
         for fraction in earlier:
             yield in_space(self._problem, self.state["vertices"], fraction, replace(own, when_settled="stop"))
         yield in_space(self._problem, self.state["vertices"], last, own)
+
+    def _tangent_planes(self) -> Stages:
+        """Patches at the boundary are frozen in a run, so they are made anew some times."""
+        problem, settings = self._problem, self._problem.settings
+        for _ in range(_TANGENT_ROUNDS if problem.has_tangent_planes else 0):
+            vertices = self.state["vertices"]
+            yield along_normals(problem, vertices, settings.smoothing, settings.fairness_weight, correct=True)
 
     def _is_doubtful(self, rests: Sequence[bool]) -> bool:
         return not all(rests) or self._problem.has_collapsed(self.state["vertices"], self._start)

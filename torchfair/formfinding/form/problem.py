@@ -105,11 +105,18 @@ class FormProblem:
             return {"vertices": vertices}
         return {"vertices": vertices, **lifted_absolute_curvature_blocks(vertices, self.topology)}
 
-    def terms(self, vertices: Tensor, smoothing: float) -> list[ElementTerm]:
-        """Terms whose unknowns are the vertices, or those of the lifted formulation; ``vertices`` are the start."""
+    def terms(self, vertices: Tensor, smoothing: float, fairness_weight: float | None = None) -> list[ElementTerm]:
+        """Terms whose unknowns are the vertices, or those of the lifted formulation.
+
+        Args:
+            vertices: (V, 3) where fairness and tangent planes are seen from.
+            smoothing: See :meth:`smoothing`.
+            fairness_weight: By default that of the settings.
+        """
         settings = self.settings
         pulls = self.pulls.terms(weight=settings.handle_weight)
-        others = [*self._others(vertices, settings.fairness_weight), *pulls, *self._spreading()]
+        fairness = settings.fairness_weight if fairness_weight is None else fairness_weight
+        others = [*self._others(vertices, fairness), *pulls, *self._spreading()]
         if settings.formulation == "reduced":
             return [*self._curvature(smoothing), *self._bending(smoothing), *others]
         lifted = lifted_absolute_curvature_terms(
@@ -149,20 +156,23 @@ class FormProblem:
 
     # ---- judging ---------------------------------------------------------------------------------------
 
-    def merit(self, vertices: Tensor, smoothing: float) -> float:
-        """Smoothed C, for comparing surfaces."""
-        arguments = [(term, term.arguments({"vertices": vertices})) for term in self._curvature(smoothing)]
+    def merit(self, vertices: Tensor, smoothing: float, *, pulled: bool = False) -> float:
+        """Smoothed C, for comparing surfaces; with what handles miss if ``pulled``."""
+        pulls = self.pulls.terms(weight=self.settings.handle_weight, as_data=True) if pulled else []
+        terms = [*self._curvature(smoothing), *pulls]
+        arguments = [(term, term.arguments({"vertices": vertices})) for term in terms]
         return sum(float(term.contributions(data, term.values(data)).sum()) for term, data in arguments)
 
     def has_collapsed(self, vertices: Tensor, start: Tensor) -> bool:
         """Whether a corner angle is smaller than the settings allow and than half the smallest of the start."""
-        return self._smallest_angle(vertices) < self.least_angle(start)
+        return self.smallest_angle(vertices) < self.least_angle(start)
 
     def least_angle(self, start: Tensor) -> float:
         """Smallest corner angle, radians, that is not a collapse from this start."""
-        return min(self.settings.least_angle, 0.5 * self._smallest_angle(start))
+        return min(self.settings.least_angle, 0.5 * self.smallest_angle(start))
 
-    def _smallest_angle(self, vertices: Tensor) -> float:
+    def smallest_angle(self, vertices: Tensor) -> float:
+        """Smallest corner angle, radians."""
         return float(corner_angles(vertices, self.topology).min())
 
     # ---- terms -----------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import torch
 from torch import Tensor
@@ -16,12 +16,12 @@ from ...topology import Topology
 from ...triangulation import triangulate
 from ..handles import refuse_unreachable_handles
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
+from .follower import FormFollower, SettlingPlan
 from .measures import form_measures, form_promises
 from .plan import FormPlan
 from .problem import FormProblem, staying_vertices
 from .rim import Rim
 from .settings import FormSettings
-from .stages import in_space
 
 
 class FormRecipe(Recipe[FormSettings]):
@@ -59,6 +59,7 @@ class FormRecipe(Recipe[FormSettings]):
             self.notes.append("faces with more than three corners are cut into triangles while C is lowered")
             triangles = Topology.from_faces(triangulate(self.given, topology).triangles, topology.num_vertices)
         self.problem = FormProblem(triangles, self.unit, self.rim, self.pulls, self.settings)
+        self._follower = FormFollower(self.problem)
         self.pull(handles or {})
 
     def take_settings(self, settings: FormSettings) -> None:
@@ -72,15 +73,25 @@ class FormRecipe(Recipe[FormSettings]):
 
     def plan(self, state: State) -> FormPlan:
         """Along normals with decreasing smoothing, then in space."""
+        self._follower.forget()
         return FormPlan(self.problem, state, nearby=self._nearby)
+
+    def predicted(self, state: State) -> State:
+        """Cones around handles."""
+        return self._follower.predicted(state)
 
     def follower(self, state: State) -> Stage:
         """In space, with the last smoothing."""
-        return in_space(self.problem, state["vertices"], self.settings.smoothing, self.settings.projection)
+        return self._follower.stage(state)
 
-    def settling(self, state: State) -> FormPlan:
-        """With the last smoothing only."""
-        return FormPlan(self.problem, state, nearby=True)
+    def settling(self, state: State) -> SettlingPlan:
+        """From where the surface is and from the start, whichever is better."""
+        self._follower.forget()
+        return SettlingPlan(self.problem, state, self.start, nearby=self._nearby)
+
+    def snapshot(self) -> Callable[[], None]:
+        """What following remembers."""
+        return self._follower.snapshot()
 
     def observe(self, state: State) -> dict[str, float]:
         """C, in the unit of the input."""
@@ -94,6 +105,7 @@ class FormRecipe(Recipe[FormSettings]):
     def forget(self) -> None:
         """Searches for closest points begin anew."""
         self.problem.forget()
+        self._follower.forget()
 
     def vertices(self, state: State) -> Tensor:
         """(V, 3) of a state in the unit of the input; gliding boundary vertices are on their curves."""
@@ -189,8 +201,6 @@ def minimise_absolute_curvature(
     """
 
     def begin() -> FormRecipe:
-        return FormRecipe(
-            vertices, topology, curves=curves, normals=normals, handles=handles, settings=settings
-        )
+        return FormRecipe(vertices, topology, curves=curves, normals=normals, handles=handles, settings=settings)
 
     return solved(begin, vertices, levels=levels, callback=callback)

@@ -51,7 +51,7 @@ class Rim(NamedTuple):
         return Rim(self.track.refined(refinement), _refined_normals(self.normals, refinement))
 
     def nearest(self, vertices: Tensor, *, glides: bool) -> Tensor:
-        """The vertices (V, 3), those of the boundary in their places or, if they glide, in the nearest on the curves."""
+        """The vertices (V, 3), those of the boundary in their places or, gliding, in the nearest on the curves."""
         track = self.track.updated(vertices) if glides else self.track
         return track.positions(vertices)
 

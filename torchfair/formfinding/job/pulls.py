@@ -78,7 +78,7 @@ class Pulls:
         return distances
 
     def terms(self, *, weight: float, as_data: bool = False) -> list[ElementTerm]:
-        """Squared distances from the aims; where they cover all vertices they are refreshed, unless asked for as data."""
+        """Squared distances from the aims; if they cover all vertices, refreshed, unless asked for as data."""
         if not self.everywhere:
             chosen = self.vertices
             return handle_terms(chosen, self.aims[chosen], weight=weight * self.strength)

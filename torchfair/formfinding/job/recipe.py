@@ -84,6 +84,10 @@ class Recipe(ABC, Generic[S]):
     def follower(self, state: State) -> Stage:
         """What one step of a live session lowers, from a state on."""
 
+    def predicted(self, state: State) -> State:
+        """Where a live step begins once handles have moved, by default where the mesh is."""
+        return state
+
     def settling(self, state: State, damping: float | None) -> Plan:
         """What a live session does once handles are let go: by default what its steps do, until one changes little.
 
