@@ -37,8 +37,9 @@ def cone_weights(vertices: Tensor, topology: Topology, handles: Tensor, stays: T
         from_handle, from_rest = (
             _distances(graph, sources) for sources in ([handle], torch.nonzero(rest).flatten().tolist())
         )
-        share = np.where(np.isinf(from_rest), 1.0, from_rest / np.maximum(from_rest + from_handle, 1e-300))
-        result[:, column] = torch.from_numpy(np.where(np.isinf(from_handle), 0.0, share))
+        moves = torch.from_numpy(np.isfinite(from_handle) & (from_rest > 0.0))
+        ways = (torch.from_numpy(from_handle)[moves], torch.from_numpy(from_rest)[moves])
+        result[moves, column] = 1.0 / (1.0 + ways[0] / ways[1])
     return result
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -16,14 +17,15 @@ from .problem import FormProblem
 from .stages import in_space
 
 _SHARES = (1.0, 0.5, 0.25)  # of the way on which vertices follow handles, until no face is crushed
+_LEAST_ANGLE = math.radians(1.0)  # far handles need slender triangles: larger ones would hold them back
 
 
 class FormFollower:
     """Steps in space, with smoothing and fairness as they were where following began.
 
     What surrounds handles is moved along with them first: a step alone would raise a spike, since flat stars want to
-    stay flat. Fairness is as strong as while smoothing is coarse, and no step leads to a smaller angle than a whole
-    solve would allow, or than there is already.
+    stay flat. Fairness is as strong as while smoothing is coarse, and no step leads to an angle below one degree or below
+    the smallest there is.
 
     Args:
         problem: Terms and fixed vertices.
@@ -42,8 +44,9 @@ class FormFollower:
             self._base, self._begun = vertices, self._begun + 1
         base, settings = self._base, problem.settings
         smoothing, fairness = problem.smoothing(base, settings.smoothing), settings.coarse_fairness_weight
+        own = replace(settings.projection, least_extrapolation=math.inf)  # longer steps carry handles past their targets
         return replace(
-            in_space(problem, vertices, settings.smoothing, settings.projection),
+            in_space(problem, vertices, settings.smoothing, own),
             terms=lambda: problem.terms(base, smoothing, fairness),
             version=("live", self._begun, problem.pulls.version),
             guard=self._guard(vertices),
@@ -85,12 +88,12 @@ class FormFollower:
 
     def _guard(self, vertices: Tensor) -> FaceGuard:
         problem = self._problem
-        least = min(problem.settings.least_angle, problem.smallest_angle(vertices))
+        least = min(_LEAST_ANGLE, problem.settings.least_angle, problem.smallest_angle(vertices))
         return FaceGuard(problem.topology, lambda state: state["vertices"], least)
 
 
 class SettlingPlan(FormPlan):
-    """From where the surface is, with the last smoothing; then the whole job from its start, and the better surface is kept.
+    """From where the surface is, with the last smoothing, and the whole job from its start: the better surface is kept.
 
     What was dragged may rest in a surface of higher C than there is: many minima lie next to each other. So what is
     found is no worse than what the whole job finds, whatever the way of the handles was. The whole job is left out
@@ -127,7 +130,5 @@ class SettlingPlan(FormPlan):
         state = super().best()
         if self._found is None:
             return state
-        problem, vertices = self._problem, self._found["vertices"]
-        smoothing = problem.smoothing(vertices, problem.settings.smoothing)
-        merits = [problem.merit(x, smoothing, pulled=True) for x in (vertices, state["vertices"])]
-        return state if merits[1] < merits[0] else self._found
+        found, other = (self._problem.curvature_and_pulls(one["vertices"]) for one in (self._found, state))
+        return state if other < found else self._found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import torch
@@ -156,12 +157,14 @@ class FormProblem:
 
     # ---- judging ---------------------------------------------------------------------------------------
 
-    def merit(self, vertices: Tensor, smoothing: float, *, pulled: bool = False) -> float:
-        """Smoothed C, for comparing surfaces; with what handles miss if ``pulled``."""
-        pulls = self.pulls.terms(weight=self.settings.handle_weight, as_data=True) if pulled else []
-        terms = [*self._curvature(smoothing), *pulls]
-        arguments = [(term, term.arguments({"vertices": vertices})) for term in terms]
-        return sum(float(term.contributions(data, term.values(data)).sum()) for term, data in arguments)
+    def merit(self, vertices: Tensor, smoothing: float) -> float:
+        """Smoothed C, for comparing surfaces."""
+        return _total(self._curvature(smoothing), vertices)
+
+    def curvature_and_pulls(self, vertices: Tensor) -> float:
+        """C, and what handles miss, for comparing surfaces."""
+        pulls = self.pulls.terms(weight=self.settings.handle_weight, as_data=True)
+        return float(total_absolute_curvature(vertices, self.topology)) + _total(pulls, vertices)
 
     def has_collapsed(self, vertices: Tensor, start: Tensor) -> bool:
         """Whether a corner angle is smaller than the settings allow and than half the smallest of the start."""
@@ -240,3 +243,9 @@ def staying_vertices(topology: Topology, track: BoundaryTrack, settings: FormSet
     """(V,) bool, vertices that do not move: the boundary or, where that glides, its corners; isolated ones."""
     gliding = settings.boundary == "glide"
     return topology.is_boundary_vertex & (track.corners | (not gliding)) | (topology.valences == 0)
+
+
+def _total(terms: Sequence[ElementTerm], vertices: Tensor) -> float:
+    """What the terms contribute to the merit at vertices (V, 3)."""
+    arguments = [(term, term.arguments({"vertices": vertices})) for term in terms]
+    return sum(float(term.contributions(data, term.values(data)).sum()) for term, data in arguments)

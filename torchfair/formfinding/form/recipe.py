@@ -84,7 +84,7 @@ class FormRecipe(Recipe[FormSettings]):
         """In space, with the last smoothing."""
         return self._follower.stage(state)
 
-    def settling(self, state: State) -> SettlingPlan:
+    def settling(self, state: State, damping: float | None) -> SettlingPlan:
         """From where the surface is and from the start, whichever is better."""
         self._follower.forget()
         return SettlingPlan(self.problem, state, self.start, nearby=self._nearby)
