@@ -45,7 +45,7 @@ from torch import Tensor
 
 import torchfair
 from torchfair import Topology
-from torchfair.formfinding import FormResult, FormSettings, minimise_absolute_curvature
+from torchfair.formfinding import FormSettings, JobResult, Level, minimise_absolute_curvature
 from torchfair.projection import IterationRecord
 
 PARTS = ("linearise", "solve", "merit")
@@ -81,7 +81,7 @@ TABLE = {
 class Run:
     """A call, and when it had reached which C."""
 
-    result: FormResult
+    result: JobResult[Level]
     seconds: float
     processor: float
     trace: list[tuple[float, float, float]]
@@ -99,7 +99,7 @@ class Run:
 
     def row(self) -> dict[str, object]:
         """For JSON."""
-        stages = self.result.stages
+        stages = self.result.runs
         split = {part: sum(stage.timings[part] for stage in stages) for part in PARTS}
         engine = sum(stage.timings["total"] for stage in stages)
         split["other"] = engine - sum(split.values())

@@ -23,7 +23,7 @@ from torchfair.constraints import absolute_curvature_terms, tangential_fairness_
 from torchfair.constraints.absolute_curvature import closed_star, open_star
 from torchfair.curves import ClosedCurve
 from torchfair.energies import normal_variation, total_absolute_curvature
-from torchfair.formfinding import FormResult, minimise_absolute_curvature
+from torchfair.formfinding import JobResult, Level, minimise_absolute_curvature
 from torchfair.geometry import corner_angles, face_areas, shape_operators, vertex_areas
 from torchfair.normalisation import Normalisation
 from torchfair.projection import ElementTerm, ProjectionSettings, SmoothAbsolute, guided_projection
@@ -144,12 +144,12 @@ def figures(vertices: Tensor, topology: Topology) -> Report:
     }
 
 
-def solve(vertices: Tensor, topology: Topology, **arguments: object) -> tuple[FormResult, Report]:
+def solve(vertices: Tensor, topology: Topology, **arguments: object) -> tuple[JobResult[Level], Report]:
     """The surface of least C and what it cost."""
     begin, cpu = time.perf_counter(), time.process_time()
     found = minimise_absolute_curvature(vertices, topology, **arguments)  # type: ignore[arg-type]
     times = {"seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - cpu}
-    steps = [stage.iterations for stage in found.stages]
+    steps = [stage.iterations for stage in found.runs]
     return found, times | {"iterations": steps, "message": found.message, "after": found.after}
 
 

@@ -12,10 +12,11 @@ from torch import Tensor
 
 from torchfair.curves import ClosedCurve
 from torchfair.energies import total_absolute_curvature
-from torchfair.formfinding import FormSettings, start_surface
+from torchfair.formfinding import FormRecipe, FormSettings, start_surface
 from torchfair.formfinding.form.boundary_track import BoundaryTrack
-from torchfair.formfinding.form.measures import form_measures
 from torchfair.formfinding.form.problem import FormProblem, staying_vertices
+from torchfair.formfinding.form.rim import Rim
+from torchfair.formfinding.job import Pulls
 from torchfair.geometry import corner_angles, edge_lengths, vertex_normals
 from torchfair.normalisation import Normalisation
 
@@ -34,10 +35,10 @@ def problem(
     settings: FormSettings | None = None,
 ) -> FormProblem:
     settings = settings or FormSettings()
-    track = BoundaryTrack.through(vertices, TOPOLOGY, settings.corner_angle)
-    normals = torch.zeros_like(vertices) if normals is None else normals
-    targets = vertices[handles] if targets is None else targets
-    return FormProblem(TOPOLOGY, Normalisation.of(vertices, TOPOLOGY), track, normals, handles, targets, settings)
+    rim = Rim.of(vertices, TOPOLOGY, None, normals, settings.corner_angle)
+    pulls = Pulls(vertices)
+    pulls.pull(handles, vertices[handles] if targets is None else targets)
+    return FormProblem(TOPOLOGY, Normalisation.of(vertices, TOPOLOGY), rim, pulls, settings)
 
 
 def upright(where: Tensor) -> Tensor:
@@ -133,13 +134,14 @@ def test_the_largest_tilt_and_the_farthest_handle_are_reported() -> None:
     tilts = torch.tensor([0.1, 0.4, 0.2, 2.0], dtype=DOUBLE)
     normals = torch.zeros_like(vertices)
     normals[rim[:4]] = torch.stack([tilts.sin(), torch.zeros(4, dtype=DOUBLE), tilts.cos()], 1)
-    handles = torch.tensor([0, 1, 2])
-    targets = vertices[handles] + torch.tensor([[0.0, 0.0, 0.1], [0.3, 0.0, 0.4], [0.0, 0.2, 0.0]], dtype=DOUBLE)
-    measures = form_measures(vertices, topology, normals, handles, targets)
+    offsets = torch.tensor([[0.0, 0.0, 0.1], [0.3, 0.0, 0.4], [0.0, 0.2, 0.0]], dtype=DOUBLE)
+    recipe = FormRecipe(vertices, topology, normals=normals)
+    recipe.pull({number: (vertices[number] + offset).tolist() for number, offset in enumerate(offsets)})
+    measures = recipe.measures(vertices)
     assert measures["largest_tilt_degrees"] == pytest.approx(math.degrees(2.0))
     assert measures["largest_handle_distance"] == pytest.approx(0.5)
-    none = form_measures(vertices, topology, torch.zeros_like(vertices), handles[:0], targets[:0])
-    assert none["largest_tilt_degrees"] == none["largest_handle_distance"] == 0.0
+    none = FormRecipe(vertices, topology).measures(vertices)
+    assert none["largest_tilt_degrees"] == none["largest_handle_distance"] == none["largest_boundary_distance"] == 0.0
 
 
 def circle() -> ClosedCurve:

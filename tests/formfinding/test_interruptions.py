@@ -17,8 +17,9 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.formfinding import (
     FairSettings,
-    FormResult,
     FormSettings,
+    JobResult,
+    Level,
     SymmetricDesign,
     SymmetricResult,
     SymmetricSettings,
@@ -26,7 +27,7 @@ from torchfair.formfinding import (
     minimise_normal_variation,
     principal_symmetric,
 )
-from torchfair.formfinding.form import stages
+from torchfair.formfinding.form.plan import FormPlan
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.projection import IterationRecord, Status
 from torchfair.shapes import Cylinder, Torus, principal_triangles
@@ -124,24 +125,26 @@ def barrel() -> tuple[Tensor, Topology]:
 
 FORM = replace(FormSettings(), boundary="glide", projection=replace(FormSettings().projection, max_iterations=3))
 FORM_PHASES = {  # function, call, stages of the coarse level that are done (-1: all), whether the fine level is
-    "start": ("form.recipe:one_start", 1, 0, False),
+    "start": ("job.recipe:one_start", 1, 0, False),
     "measuring the start": ("form.recipe:form_measures", 1, 0, False),
-    "problem": ("form.level:FormProblem", 1, 0, False),
+    "problem": ("form.recipe:FormProblem", 1, 0, False),
     "directions": ("form.problem:FormProblem.directions", 1, 0, False),
-    "first compiled": ("form.stages:GuidedProjection", 1, 0, False),
-    "doubt": ("form.stages:FormStages._is_doubtful", 1, 1, False),
-    "second compiled": ("form.stages:GuidedProjection", 2, 1, False),
-    "third compiled": ("form.stages:GuidedProjection.with_terms", 1, 2, False),
-    "end of the level": ("form.level:FormLevel.moved", 1, -1, False),
-    "refinement": ("form.level:loop", 1, -1, False),
-    "finer problem": ("form.level:FormProblem", 2, -1, False),
-    "finer compiled": ("form.stages:GuidedProjection", 3, -1, False),
-    "measuring the result": ("form.recipe:form_measures", 2, -1, True),
+    "first terms": ("form.problem:FormProblem.height_terms", 1, 0, False),
+    "first compiled": ("job.session:GuidedProjection", 1, 0, False),
+    "doubt": ("form.plan:FormPlan._is_doubtful", 1, 1, False),
+    "second compiled": ("job.session:GuidedProjection", 2, 1, False),
+    "third compiled": ("job.session:GuidedProjection.with_terms", 1, 2, False),
+    "measuring the level": ("form.recipe:form_measures", 2, -1, False),
+    "refinement": ("form.recipe:loop", 1, -1, False),
+    "finer problem": ("form.recipe:FormProblem", 2, -1, False),
+    "measuring the finer start": ("form.recipe:form_measures", 3, -1, False),
+    "finer compiled": ("job.session:GuidedProjection", 3, -1, False),
+    "measuring the result": ("form.recipe:form_measures", 4, -1, True),
 }
 
 
 @pytest.fixture(scope="module")
-def surfaces() -> list[FormResult]:
+def surfaces() -> list[JobResult[Level]]:
     """Of the barrel, undisturbed, without and with refinement."""
     return [minimise_absolute_curvature(*barrel(), levels=levels, settings=FORM) for levels in (0, 1)]
 
@@ -149,7 +152,7 @@ def surfaces() -> list[FormResult]:
 @WAYS
 @pytest.mark.parametrize("phase", FORM_PHASES)
 def test_lowering_c_keeps_the_stages_and_levels_done(
-    phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, surfaces: list[FormResult]
+    phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, surfaces: list[JobResult[Level]]
 ) -> None:
     place, n, stages, fine = FORM_PHASES[phase]
     disturb(monkeypatch, place, n, act)
@@ -162,9 +165,9 @@ def test_lowering_c_keeps_the_stages_and_levels_done(
         return
     assert result.projection.status is Status.INTERRUPTED
     assert result.topology.num_vertices == topology.num_vertices
-    done = [run for run in result.stages if run.iterations]
-    assert len(done) == (len(surfaces[0].stages) if stages < 0 else stages)
-    assert result.levels == [0] * len(result.stages)
+    (level,) = result.levels
+    done = [run for run in level.runs if run.iterations]
+    assert len(done) == (len(surfaces[0].runs) if stages < 0 else stages)
     if stages < 0:
         assert torch.equal(result.vertices, surfaces[0].vertices)
         assert result.after == surfaces[0].after
@@ -180,7 +183,7 @@ def test_a_second_start_that_is_interrupted_does_not_replace_the_better_surface(
 ) -> None:
     """Where the coarse smoothings are in doubt, the last one is tried from the start."""
     vertices, topology = barrel()
-    monkeypatch.setattr(stages.FormStages, "_is_doubtful", lambda *_: True)
+    monkeypatch.setattr(FormPlan, "_is_doubtful", lambda *_: True)
     undisturbed = minimise_absolute_curvature(vertices, topology, settings=FORM)
     second = len(FORM.smoothings()) - 1  # stages with coarser smoothings
     starts: list[int] = []
@@ -191,9 +194,9 @@ def test_a_second_start_that_is_interrupted_does_not_replace_the_better_surface(
             raise KeyboardInterrupt
 
     result = minimise_absolute_curvature(vertices, topology, settings=FORM, callback=stop_in_the_second)
-    assert len(result.stages) == second + 1
+    assert len(result.runs) == second + 1
     assert result.projection.status is Status.INTERRUPTED
-    assert len(undisturbed.stages) > second + 1
+    assert len(undisturbed.runs) > second + 1
     found = result.after["total_absolute_curvature"]
     assert found < 0.9 * result.before["total_absolute_curvature"]
 

@@ -13,7 +13,7 @@ from torchfair import Topology
 from torchfair.constraints import BoundaryNormals
 from torchfair.curves import ClosedCurve
 from torchfair.errors import MeshError, ShapeError
-from torchfair.formfinding import FormResult, FormSettings, minimise_absolute_curvature, start_surface
+from torchfair.formfinding import FormSettings, JobResult, Level, minimise_absolute_curvature, start_surface
 from torchfair.geometry import face_areas
 from torchfair.projection import ProjectionSettings, Status
 from torchfair.shapes import Cone, Cylinder, Surface, Torus, irregular_triangles, principal_triangles
@@ -50,8 +50,8 @@ def cone_distance(vertices: Tensor, bottom: float, top: float, height: float) ->
     return float((vertices[:, :2].norm(dim=1) - exact).abs().max() / slant)
 
 
-def assert_monotone(result: FormResult) -> None:
-    for stage in result.stages:
+def assert_monotone(result: JobResult[Level]) -> None:
+    for stage in result.runs:
         merits = [record.merit for record in stage.history]
         assert merits == sorted(merits, reverse=True)
 
@@ -85,7 +85,7 @@ def test_refinement_comes_nearer_to_the_cone() -> None:
     vertices, topology = barrel(Cone(1.0, 0.5, 1.0), 1.0, 0.5, 1.0, "irregular")
     coarse, fine = (minimise_absolute_curvature(vertices, topology, levels=levels) for levels in (0, 1))
     assert fine.topology.num_faces == 4 * topology.num_faces
-    assert fine.levels == [0] * len(coarse.stages) + [1] * (len(fine.stages) - len(coarse.stages))
+    assert [len(level.runs) for level in fine.levels] == [len(coarse.runs), len(fine.runs) - len(coarse.runs)]
     errors = [abs(result.after["total_absolute_curvature"] - TURN) for result in (coarse, fine)]
     assert errors[1] < 0.8 * errors[0]
     assert cone_distance(fine.vertices, 1.0, 0.5, 1.0) < cone_distance(coarse.vertices, 1.0, 0.5, 1.0)
@@ -193,7 +193,7 @@ def test_results_do_not_depend_on_the_unit(unit: float) -> None:
     plain = minimise_absolute_curvature(vertices, topology)
     scaled = minimise_absolute_curvature(unit * vertices, topology)
     torch.testing.assert_close(scaled.vertices / unit, plain.vertices, atol=1e-6, rtol=0)
-    assert [s.iterations for s in scaled.stages] == [s.iterations for s in plain.stages]
+    assert [s.iterations for s in scaled.runs] == [s.iterations for s in plain.runs]
 
 
 def test_handles_are_reached_and_kept_through_refinement() -> None:
@@ -286,7 +286,7 @@ def test_stopping_keeps_the_best_and_ends_all_stages() -> None:
         return len(seen) == 3
 
     result = minimise_absolute_curvature(vertices, topology, levels=2, callback=stop)
-    assert len(result.stages) == 1
+    assert len(result.runs) == 1
     assert result.projection.status is Status.CALLBACK
     assert result.topology.num_faces == topology.num_faces
     assert result.after["total_absolute_curvature"] < result.before["total_absolute_curvature"]

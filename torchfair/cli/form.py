@@ -52,9 +52,8 @@ class FormCommand(JobCommand):
     def function(self) -> Callable[..., JobResult[Level]]:
         """See the base class."""
         from ..formfinding import minimise_absolute_curvature
-        from .older_results import as_job
 
-        return as_job(minimise_absolute_curvature)
+        return minimise_absolute_curvature
 
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh or curves, and points to pass through."""

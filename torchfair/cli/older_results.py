@@ -15,21 +15,9 @@ def as_job(function: Callable[..., Any]) -> Callable[..., JobResult[Any]]:
         result = function(*positional, **named)
         if isinstance(result, JobResult):
             return result
-        if hasattr(result, "stages"):
-            return JobResult(_levels_of_stages(result), result.notes, stopped=False)
         return JobResult([_with_topology(level) for level in result.levels], result.notes, result.stopped)
 
     return run
-
-
-def _levels_of_stages(result: Any) -> list[Level]:
-    """Every level has the measures of the whole."""
-    finest, before, after = (result.vertices, result.topology), result.before, result.after
-    runs = [
-        [run for run, level in zip(result.stages, result.levels, strict=True) if level == number]
-        for number in range(max(result.levels) + 1)
-    ]
-    return [Level(*finest, before, after, of_level, []) for of_level in runs]
 
 
 def _with_topology(level: Any) -> Level:

@@ -8,7 +8,7 @@ from .fair.recipe import FairRecipe as FairRecipe
 from .fair.recipe import minimise_normal_variation as minimise_normal_variation
 from .fair.settings import FairSettings as FairSettings
 from .form.prescribed_normals import prescribed_normals as prescribed_normals
-from .form.recipe import FormResult as FormResult
+from .form.recipe import FormRecipe as FormRecipe
 from .form.recipe import minimise_absolute_curvature as minimise_absolute_curvature
 from .form.settings import FormSettings as FormSettings
 from .form.start_surface import start_surface as start_surface

@@ -1,8 +1,9 @@
-"""What the job that lowers C reports."""
+"""What the job that lowers C reports and promises."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import torch
 from torch import Tensor
@@ -15,22 +16,33 @@ from ...energies import (
     total_frobenius_curvature,
     total_mean_curvature,
 )
-from ...geometry import corner_angles, edge_lengths, face_areas
+from ...geometry import corner_angles, edge_lengths, face_areas, face_normals, vertex_normals
 from ...topology import Topology
+from ..job.promises import Promise
+from .settings import FormSettings
+
+_HANDLE_REACHED = 0.05  # mean edge lengths
+_ON_THE_CURVES = 1e-6  # mean edge lengths
+_TANGENT = 1.0  # degrees
 
 
-def form_measures(
-    vertices: Tensor, topology: Topology, normals: Tensor, handles: Tensor, targets: Tensor
-) -> dict[str, float]:
-    """Energies and conditions of one mesh, in units of the input.
+def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Tensor, away: Tensor) -> dict[str, float]:
+    """Energies and conditions of one mesh, in the unit of the input.
+
+    Args:
+        vertices: (V, 3).
+        topology: Its connectivity.
+        rim: (V, 3) the same, with boundary vertices where they should be.
+        normals: (V, 3) prescribed unit normals of boundary vertices; zero where none is.
+        away: (n,) distances of handles from their targets.
 
     Returns:
         ``total_absolute_curvature``, ``total_frobenius_curvature``, ``normal_variation``, ``angle_variation``,
         ``total_mean_curvature`` (length), ``area``, ``mean_edge_length``, ``smallest_angle_degrees``,
-        ``largest_tilt_degrees`` between prescribed normals and those at the boundary (:class:`BoundaryNormals`), and
+        ``folded_faces`` that look away from what surrounds them, ``largest_tilt_degrees`` between prescribed normals
+        and those at the boundary (:class:`BoundaryNormals`), ``largest_boundary_distance`` and
         ``largest_handle_distance``.
     """
-    gaps = torch.linalg.vector_norm(vertices[handles] - targets, dim=1)
     return {
         "total_absolute_curvature": float(total_absolute_curvature(vertices, topology)),
         "total_frobenius_curvature": float(total_frobenius_curvature(vertices, topology)),
@@ -40,9 +52,57 @@ def form_measures(
         "area": float(face_areas(vertices, topology).sum()),
         "mean_edge_length": float(edge_lengths(vertices, topology).mean()),
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
+        "folded_faces": _folded_faces(vertices, topology),
         "largest_tilt_degrees": math.degrees(_largest_tilt(vertices, topology, normals)),
-        "largest_handle_distance": float(gaps.max()) if gaps.numel() else 0.0,
+        "largest_boundary_distance": float(torch.linalg.vector_norm(vertices - rim, dim=1).max()),
+        "largest_handle_distance": float(away.max()) if away.numel() else 0.0,
     }
+
+
+def form_promises(
+    settings: FormSettings, before: Mapping[str, float], after: Mapping[str, float], *, handles: bool, normals: bool
+) -> list[Promise]:
+    """What is asked of a mesh, and what its measures are.
+
+    Args:
+        settings: Of the job.
+        before: Measures of the start.
+        after: Measures of the mesh.
+        handles: Whether there are any.
+        normals: Whether any are prescribed.
+    """
+    edge, promises = before["mean_edge_length"], []
+    if not (handles or normals or before["largest_boundary_distance"] > _ON_THE_CURVES * edge):
+        most, reached = before["total_absolute_curvature"], after["total_absolute_curvature"]
+        slack = settings.projection.merit_tolerance
+        remedy = "start is about as good as any: lower fairness, or keep it"
+        promises.append(Promise("C", most, reached, remedy=remedy, slack=slack))
+    promises.append(
+        Promise("distance of the boundary from its curves", _ON_THE_CURVES * edge, after["largest_boundary_distance"])
+    )
+    least = min(math.degrees(settings.least_angle), 0.5 * before["smallest_angle_degrees"])
+    remedy = "raise fairness, allow more iterations, or start from more even triangles"
+    promises.append(
+        Promise("smallest angle", least, after["smallest_angle_degrees"], "at least", "degrees", remedy=remedy)
+    )
+    promises.append(Promise("folded faces", before["folded_faces"], after["folded_faces"], remedy=remedy))
+    if normals:
+        remedy = "the mesh is too coarse there: ask for another level"
+        tilt = after["largest_tilt_degrees"]
+        promises.append(Promise("angle to a prescribed tangent plane", _TANGENT, tilt, unit="degrees", remedy=remedy))
+    if handles:
+        most, reached = _HANDLE_REACHED * edge, after["largest_handle_distance"]
+        remedy = "pull less, or allow more iterations"
+        promises.append(Promise("distance of a handle from its target", most, reached, remedy=remedy))
+    return promises
+
+
+def _folded_faces(vertices: Tensor, topology: Topology) -> int:
+    """Faces that are not seen from the side from which the mean normal of their corners is."""
+    around = vertex_normals(vertices, topology)[topology.corners]
+    along = (around * face_normals(vertices, topology)[topology.corner_faces]).sum(1)
+    total = along.new_zeros(topology.num_faces).index_add_(0, topology.corner_faces, along)
+    return int((total <= 0.0).sum())
 
 
 def _largest_tilt(vertices: Tensor, topology: Topology, normals: Tensor) -> float:

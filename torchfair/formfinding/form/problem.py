@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import torch
@@ -17,7 +18,9 @@ from ...linear import Factor, factorise
 from ...normalisation import Normalisation
 from ...projection import ElementTerm
 from ...topology import Topology
+from ..job.pulls import Pulls
 from .boundary_track import BoundaryTrack
+from .rim import Rim
 from .settings import FormSettings
 
 _EXACTLY = 10.0  # weight of tangent planes in the end, over that on the way
@@ -32,37 +35,26 @@ class FormProblem:
     Args:
         topology: Triangle mesh.
         normalisation: To unit mean edge length.
-        track: Boundary vertices and their curves, in units of the input.
-        normals: (V, 3) prescribed unit normals of boundary vertices; zero where none is.
-        handles: (n,) vertices that are pulled.
-        targets: (n, 3) where to, normalised.
+        rim: What is asked along the boundary.
+        pulls: Handles and held vertices.
         settings: Weights.
-
-    Attributes:
-        fixed: (V,) bool.
     """
 
     def __init__(
-        self,
-        topology: Topology,
-        normalisation: Normalisation,
-        track: BoundaryTrack,
-        normals: Tensor,
-        handles: Tensor,
-        targets: Tensor,
-        settings: FormSettings,
+        self, topology: Topology, normalisation: Normalisation, rim: Rim, pulls: Pulls, settings: FormSettings
     ) -> None:
-        self.topology, self.settings = topology, settings
-        self.handles, self.targets = handles, targets
-        gliding = settings.boundary == "glide"
-        self.fixed = staying_vertices(topology, track, settings)
-        self.normals = normals
-        self._conditions = c.handle_terms(handles, targets, weight=settings.handle_weight)
-        if settings.umbrella_weight:
-            self._conditions += c.interior_fairness_terms(topology, weight=settings.umbrella_weight)
-        self._in_space = [*self._gliding(track, normalisation)] if gliding else []
-        if settings.tangential_fairness_weight:
-            self._in_space += c.tangential_fairness_terms(topology, weight=settings.tangential_fairness_weight)
+        self.topology, self.settings, self.pulls, self.normals = topology, settings, pulls, rim.normals
+        self._normalisation, self._track = normalisation, rim.track
+
+    @property
+    def fixed(self) -> Tensor:
+        """(V,) bool, vertices that do not move."""
+        return staying_vertices(self.topology, self._track, self.settings) | self.pulls.held
+
+    @property
+    def glides(self) -> bool:
+        """Whether boundary vertices slide along their curves."""
+        return self.settings.boundary == "glide"
 
     def smoothing(self, vertices: Tensor, fraction: float) -> float:
         """Smoothing that is the given fraction of the mean absolute curvature of a star."""
@@ -77,9 +69,10 @@ class FormProblem:
         Raw normals of a mesh that is not smooth yet cross each other and would drive vertices together.
         """
         ways = self._evened(vertex_normals(vertices, self.topology))
-        pull = self.targets - vertices[self.handles]
+        handles = self.pulls.vertices
+        pull = self.pulls.aims[handles] - vertices[handles]
         length = torch.linalg.vector_norm(pull, dim=1, keepdim=True)
-        ways[self.handles] = torch.where(length > 0.0, pull / length, ways[self.handles])
+        ways[handles] = torch.where(length > 0.0, pull / length, ways[handles])
         return ways
 
     def height_terms(
@@ -87,7 +80,8 @@ class FormProblem:
     ) -> list[ElementTerm]:
         """Terms whose unknowns are heights along the directions; the boundary stays."""
         others = self._others(vertices, fairness_weight, correct=correct)
-        terms = [*self._curvature(smoothing), *self._bending(smoothing), *others]
+        pulls = self.pulls.terms(weight=self.settings.handle_weight, as_data=True)
+        terms = [*self._curvature(smoothing), *self._bending(smoothing), *others, *pulls]
         return [c.along_directions(term, vertices, directions) for term in terms]
 
     def _evened(self, normals: Tensor) -> Tensor:
@@ -112,10 +106,18 @@ class FormProblem:
             return {"vertices": vertices}
         return {"vertices": vertices, **lifted_absolute_curvature_blocks(vertices, self.topology)}
 
-    def terms(self, vertices: Tensor, smoothing: float) -> list[ElementTerm]:
-        """Terms whose unknowns are the vertices, or those of the lifted formulation; ``vertices`` are the start."""
+    def terms(self, vertices: Tensor, smoothing: float, fairness_weight: float | None = None) -> list[ElementTerm]:
+        """Terms whose unknowns are the vertices, or those of the lifted formulation.
+
+        Args:
+            vertices: (V, 3) where fairness and tangent planes are seen from.
+            smoothing: See :meth:`smoothing`.
+            fairness_weight: By default that of the settings.
+        """
         settings = self.settings
-        others = [*self._others(vertices, settings.fairness_weight), *self._in_space]
+        pulls = self.pulls.terms(weight=settings.handle_weight)
+        fairness = settings.fairness_weight if fairness_weight is None else fairness_weight
+        others = [*self._others(vertices, fairness), *pulls, *self._spreading()]
         if settings.formulation == "reduced":
             return [*self._curvature(smoothing), *self._bending(smoothing), *others]
         lifted = lifted_absolute_curvature_terms(
@@ -126,7 +128,7 @@ class FormProblem:
         )
         return [*lifted, *others]
 
-    @cached_property
+    @property
     def fixed_in_space(self) -> Tensor:
         """(V,) bool, vertices that stay while others are spread.
 
@@ -157,18 +159,23 @@ class FormProblem:
 
     def merit(self, vertices: Tensor, smoothing: float) -> float:
         """Smoothed C, for comparing surfaces."""
-        arguments = [(term, term.arguments({"vertices": vertices})) for term in self._curvature(smoothing)]
-        return sum(float(term.contributions(data, term.values(data)).sum()) for term, data in arguments)
+        return _total(self._curvature(smoothing), vertices)
+
+    def curvature_and_pulls(self, vertices: Tensor) -> float:
+        """C, and what handles miss, for comparing surfaces."""
+        pulls = self.pulls.terms(weight=self.settings.handle_weight, as_data=True)
+        return float(total_absolute_curvature(vertices, self.topology)) + _total(pulls, vertices)
 
     def has_collapsed(self, vertices: Tensor, start: Tensor) -> bool:
         """Whether a corner angle is smaller than the settings allow and than half the smallest of the start."""
-        return self._smallest_angle(vertices) < self.least_angle(start)
+        return self.smallest_angle(vertices) < self.least_angle(start)
 
     def least_angle(self, start: Tensor) -> float:
         """Smallest corner angle, radians, that is not a collapse from this start."""
-        return min(self.settings.least_angle, 0.5 * self._smallest_angle(start))
+        return min(self.settings.least_angle, 0.5 * self.smallest_angle(start))
 
-    def _smallest_angle(self, vertices: Tensor) -> float:
+    def smallest_angle(self, vertices: Tensor) -> float:
+        """Smallest corner angle, radians."""
         return float(corner_angles(vertices, self.topology).min())
 
     # ---- terms -----------------------------------------------------------------------------------------
@@ -186,9 +193,13 @@ class FormProblem:
         """Fairness and conditions, the former and tangent planes as seen from ``vertices``."""
         return [
             *c.even_fairness_terms(vertices, self.topology, weight=fairness_weight),
-            *self._conditions,
+            *self._umbrellas(),
             *self._tangent_planes(vertices, correct),
         ]
+
+    def _umbrellas(self) -> list[ElementTerm]:
+        weight = self.settings.umbrella_weight
+        return c.interior_fairness_terms(self.topology, weight=weight) if weight else []
 
     def _tangent_planes(self, vertices: Tensor, correct: bool) -> list[ElementTerm]:
         chosen = torch.nonzero((self.normals != 0.0).any(1)).squeeze(1)
@@ -201,20 +212,40 @@ class FormProblem:
         targets = c.BoundaryNormals.of(vertices, self.topology).star_targets(self.normals)
         return c.tangent_plane_terms(self.topology, chosen, targets[chosen], weight=weight)
 
-    def _gliding(self, track: BoundaryTrack, normalisation: Normalisation) -> list[ElementTerm]:
+    def _spreading(self) -> list[ElementTerm]:
+        """What only vertices that move in space need: they slide along curves, and over the surface."""
+        settings, terms = self.settings, []
+        if self._feet is not None:
+            terms += c.gliding_terms(self._feet, weight=settings.boundary_weight)
+            terms += c.boundary_fairness_terms(self.topology, self._track.corners, weight=settings.fairness_weight)
+        if settings.tangential_fairness_weight:
+            terms += c.tangential_fairness_terms(self.topology, weight=settings.tangential_fairness_weight)
+        return terms
+
+    @cached_property
+    def _feet(self) -> c.CurveFeet | None:
+        """Of gliding vertices on their curves."""
+        track = self._track
         spans = [span for curve in track.curves for span in curve.spans()]
-        if not spans:
-            return []
+        if self.settings.boundary == "fixed" or not spans:
+            return None
         vertices = torch.nonzero(self.topology.is_boundary_vertex & ~track.corners).squeeze(1)
-        curves = SplineCurves([normalisation.apply(span.points) for span in spans], [span.closed for span in spans])
-        settings = self.settings
-        return [
-            *c.gliding_terms(c.CurveFeet(curves, vertices, track.spans(vertices)), weight=settings.boundary_weight),
-            *c.boundary_fairness_terms(self.topology, track.corners, weight=settings.fairness_weight),
-        ]
+        normalise = self._normalisation.apply
+        curves = SplineCurves([normalise(span.points) for span in spans], [span.closed for span in spans])
+        return c.CurveFeet(curves, vertices, track.spans(vertices))
+
+    def forget(self) -> None:
+        """Makes searches for closest points anew."""
+        self.__dict__.pop("_feet", None)
 
 
 def staying_vertices(topology: Topology, track: BoundaryTrack, settings: FormSettings) -> Tensor:
     """(V,) bool, vertices that do not move: the boundary or, where that glides, its corners; isolated ones."""
     gliding = settings.boundary == "glide"
     return topology.is_boundary_vertex & (track.corners | (not gliding)) | (topology.valences == 0)
+
+
+def _total(terms: Sequence[ElementTerm], vertices: Tensor) -> float:
+    """What the terms contribute to the merit at vertices (V, 3)."""
+    arguments = [(term, term.arguments({"vertices": vertices})) for term in terms]
+    return sum(float(term.contributions(data, term.values(data)).sum()) for term, data in arguments)

@@ -2,59 +2,146 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 
 import torch
 from torch import Tensor
 
-from ..._interrupts import deferred_interrupts
 from ...curves import ClosedCurve
-from ...errors import MeshError, ShapeError
-from ...normalisation import Normalisation
-from ...projection import Callback, ProjectionResult
+from ...energies import total_absolute_curvature
+from ...projection import Callback
+from ...projection.layout import State
+from ...subdivision import catmull_clark, loop
 from ...topology import Topology
-from ..checks import one_start, refuse_degenerate_faces
-from ..handles import read_handles, refuse_unreachable_handles
-from ..stopping import interrupted, stopped
-from .boundary_track import BoundaryTrack
-from .level import FormJob, FormLevel, Handles
-from .measures import form_measures
-from .problem import staying_vertices
+from ...triangulation import triangulate
+from ..handles import refuse_unreachable_handles
+from ..job import JobResult, Level, Promise, Recipe, Stage, solved
+from .follower import FormFollower, SettlingPlan
+from .measures import form_measures, form_promises
+from .plan import FormPlan
+from .problem import FormProblem, staying_vertices
+from .rim import Rim
 from .settings import FormSettings
 
 
-@dataclass(frozen=True)
-class FormResult:
-    """A surface of low C.
+class FormRecipe(Recipe[FormSettings]):
+    """Lowers C; see :func:`minimise_absolute_curvature`.
+
+    Args:
+        vertices, topology, curves, normals, settings: See :func:`minimise_absolute_curvature`.
+        handles: Likewise; more of them may be pulled later.
+        rim: Curves and normals of a coarser mesh, carried on to its refinement, instead of ``curves`` and ``normals``;
+            the vertices are then taken to be near the solution.
 
     Attributes:
-        vertices: (V', 3) in the unit and dtype of the input.
-        topology: of the input, or its refinement.
-        stages: Every run of guided projection, in order, in normalised units; the quantity
-            ``total_absolute_curvature`` in the history is in the unit of the input. Merits fall within a stage.
-        levels: Level of refinement of every stage.
-        before, after: Energies and conditions, see ``form_measures``; ``before`` is that of the input.
-        notes: What the job decided on its own, in words.
+        rim: What is asked along the boundary.
     """
 
-    vertices: Tensor
-    topology: Topology
-    stages: list[ProjectionResult]
-    levels: list[int]
-    before: dict[str, float]
-    after: dict[str, float]
-    notes: list[str]
+    name = "form"
 
-    @property
-    def projection(self) -> ProjectionResult:
-        """The last stage."""
-        return self.stages[-1]
+    def __init__(
+        self,
+        vertices: Tensor,
+        topology: Topology,
+        *,
+        curves: Sequence[ClosedCurve] | None = None,
+        normals: Tensor | None = None,
+        handles: Mapping[int, Sequence[float]] | None = None,
+        settings: FormSettings | None = None,
+        rim: Rim | None = None,
+    ) -> None:
+        super().__init__(vertices, topology, settings or FormSettings())
+        self._input, self._nearby, topology = self.given, rim is not None, self.topology
+        self.rim = rim or Rim.of(self.given, topology, curves, normals, self.settings.corner_angle)
+        self.start_at(self.rim.track.positions(self.given))
+        triangles = topology
+        if not topology.is_triangular:
+            self.notes.append("faces with more than three corners are cut into triangles while C is lowered")
+            triangles = Topology.from_faces(triangulate(self.given, topology).triangles, topology.num_vertices)
+        self.problem = FormProblem(triangles, self.unit, self.rim, self.pulls, self.settings)
+        self._follower = FormFollower(self.problem)
+        self.pull(handles or {})
 
-    @property
-    def message(self) -> str:
-        """Why the last stage ended."""
-        return self.projection.message
+    def take_settings(self, settings: FormSettings) -> None:
+        """Takes other weights."""
+        super().take_settings(settings)
+        self.problem.settings = settings
+
+    def check_pulls(self, vertices: Tensor, targets: Tensor) -> None:
+        """Refuses handles on a boundary that stays, away from where they are."""
+        refuse_unreachable_handles(vertices, targets, self.given, self.stays())
+
+    def plan(self, state: State) -> FormPlan:
+        """Along normals with decreasing smoothing, then in space."""
+        self._follower.forget()
+        return FormPlan(self.problem, state, nearby=self._nearby)
+
+    def predicted(self, state: State) -> State:
+        """Cones around handles."""
+        return self._follower.predicted(state)
+
+    def follower(self, state: State) -> Stage:
+        """In space, with the last smoothing."""
+        return self._follower.stage(state)
+
+    def settling(self, state: State, damping: float | None) -> SettlingPlan:
+        """From where the surface is and from the start, whichever is better."""
+        self._follower.forget()
+        return SettlingPlan(self.problem, state, self.start, nearby=self._nearby)
+
+    def snapshot(self) -> Callable[[], None]:
+        """What following remembers."""
+        return self._follower.snapshot()
+
+    def observe(self, state: State) -> dict[str, float]:
+        """C, in the unit of the input."""
+        found = float(total_absolute_curvature(state["vertices"], self.problem.topology))
+        return {"total_absolute_curvature": self.unit.length * found}
+
+    def stays(self) -> Tensor:
+        """The boundary or, where that glides, its corners; isolated vertices."""
+        return staying_vertices(self.topology, self.rim.track, self.settings)
+
+    def forget(self) -> None:
+        """Searches for closest points begin anew."""
+        self.problem.forget()
+        self._follower.forget()
+
+    def vertices(self, state: State) -> Tensor:
+        """(V, 3) of a state in the unit of the input; gliding boundary vertices are on their curves."""
+        vertices = super().vertices(state)
+        return self._on_the_rim(vertices) if self.problem.glides else vertices
+
+    def before(self) -> dict[str, float]:
+        """Measures of the input, before its boundary is moved onto the curves."""
+        return self.measures(self._input)
+
+    def measures(self, vertices: Tensor) -> dict[str, float]:
+        """See ``form_measures``."""
+        away = self.unit.length * self.pulls.away(self.unit.apply(vertices))
+        return form_measures(vertices, self.topology, self._on_the_rim(vertices), self.rim.normals, away)
+
+    def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
+        """See ``form_promises``."""
+        handles, normals = bool(self.pulls.pulled.any()), self.problem.has_tangent_planes
+        return form_promises(self.settings, before, after, handles=handles, normals=normals)
+
+    def refined(self, state: State) -> FormRecipe:
+        """By Loop or Catmull-Clark subdivision; new boundary vertices are put on the curves, by arc length."""
+        vertices, pulls = self.vertices(state), self.pulls
+        track = self.rim.track.updated(vertices) if self.problem.glides else self.rim.track
+        scheme = loop if self.topology.is_triangular else catmull_clark
+        step = scheme(self.topology, boundary="interpolate", corners=track.corners)
+        rim = self.rim._replace(track=track).refined(step)
+        targets = self.unit.invert(pulls.targets[pulls.vertices])
+        handles = dict(zip(pulls.vertices.tolist(), targets.tolist(), strict=True))
+        start = rim.track.positions(step.apply(vertices))
+        finer = FormRecipe(start, step.topology, handles=handles, settings=self.settings, rim=rim)
+        finer.pulls.hold(torch.nonzero(pulls.held).squeeze(1))
+        return finer
+
+    def _on_the_rim(self, vertices: Tensor) -> Tensor:
+        return self.rim.nearest(vertices, glides=self.problem.glides)
 
 
 def minimise_absolute_curvature(
@@ -67,7 +154,7 @@ def minimise_absolute_curvature(
     levels: int = 0,
     settings: FormSettings | None = None,
     callback: Callback | None = None,
-) -> FormResult:
+) -> JobResult[Level]:
     """Moves the vertices of a surface so that C, the integral of ``|k1| + |k2|``, becomes small.
 
     Boundary vertices keep their places or glide on the boundary curves. With ``levels`` the result is refined
@@ -77,6 +164,12 @@ def minimise_absolute_curvature(
     results do not depend on the unit.
 
     Minimisers are not unique: the start decides, among other things, between a cone and two cones tip to tip.
+
+    Promises, which are measured on the result (:attr:`~torchfair.formfinding.JobResult.promises`): the boundary is on
+    its curves; handles are within 0.05 mean edges of their targets; prescribed tangent planes are met within a degree;
+    no more faces are folded than at the start; no corner angle falls below ``settings.least_angle`` or half the
+    smallest of the start; and C is not above that of the start, unless handles, normals or curves that the boundary is
+    moved onto ask for a different shape.
 
     Args:
         vertices: (V, 3) start.
@@ -88,75 +181,26 @@ def minimise_absolute_curvature(
         handles: Places to pass through, by vertex number.
         levels: How often to refine.
         settings: Weights, smoothing and tolerances.
-        callback: Called with every iteration record; returning True stops. Ctrl-C, or a function that
-            raises KeyboardInterrupt, returns the best mesh so far, on the finest level on which a step was taken.
+        callback: Called with every iteration record, whose quantities hold ``total_absolute_curvature``; returning
+            True stops. Ctrl-C, or a function that raises KeyboardInterrupt, returns the best mesh so far, on the finest
+            level on which a step was taken.
+
+    Returns:
+        One level for each refinement, and the first. ``before`` of the first is that of the input.
 
     Raises:
         ShapeError: vertices or normals are not ``(V, 3)``, or a handle is not a point.
         MeshError: vertices are not finite, a face has no area, curves do not fit the boundary, or a handle is
             no vertex or pulls a vertex of the boundary that stays.
+
+    Example::
+
+        vertices, topology = start_surface([curve], 500)
+        result = minimise_absolute_curvature(vertices, topology, curves=[curve], levels=1)
+        print(result.after["total_absolute_curvature"], result.holds)
     """
-    settings = settings or FormSettings()
-    with deferred_interrupts() as interrupts:
-        surface, pulled, before, notes = interrupts.insist(
-            _begin, vertices, topology, curves, normals, handles or {}, settings
-        )
-        job = FormJob(pulled, settings, callback, interrupts)
-        surface, stages = interrupts.insist(job.solved, surface)
-        stage_levels = [0] * len(stages)
-        for level in range(1, levels + 1):
-            if stopped(stages[-1]):
-                break
-            finer = interrupts.attempt(job.solved_finer, surface)
-            if finer is None:
-                stages[-1] = interrupted(stages[-1])
-                break
-            surface, runs = finer
-            stages += runs
-            stage_levels += [level] * len(runs)
-        after = interrupts.insist(form_measures, surface.vertices, surface.topology, surface.normals, *pulled)
-    return FormResult(surface.vertices.to(vertices), surface.topology, stages, stage_levels, before, after, notes)
 
+    def begin() -> FormRecipe:
+        return FormRecipe(vertices, topology, curves=curves, normals=normals, handles=handles, settings=settings)
 
-def _begin(
-    vertices: Tensor,
-    topology: Topology,
-    curves: Sequence[ClosedCurve] | None,
-    normals: Tensor | None,
-    handles: Mapping[int, Sequence[float]],
-    settings: FormSettings,
-) -> tuple[FormLevel, Handles, dict[str, float], list[str]]:
-    """The surface to start from, handles, measures and notes."""
-    start, topology = one_start(vertices, topology), topology.to("cpu")
-    Normalisation.of(start, topology)  # refuses what is not finite or has no extent
-    refuse_degenerate_faces(start, topology)
-    normals = _unit_normals(normals, topology)
-    pulled, targets = read_handles(handles, topology)
-    if curves is None:
-        track = BoundaryTrack.through(start, topology, settings.corner_angle)
-    else:
-        track = BoundaryTrack.onto(start, topology, curves)
-    current = track.positions(start)
-    refuse_unreachable_handles(pulled, targets, current, staying_vertices(topology, track, settings))
-    notes = []
-    if not topology.is_triangular:
-        notes.append("faces with more than three corners are cut into triangles while C is lowered")
-    before = form_measures(start, topology, normals, pulled, targets)
-    return FormLevel(current, topology, track, normals), (pulled, targets), before, notes
-
-
-def _unit_normals(normals: Tensor | None, topology: Topology) -> Tensor:
-    """(V, 3) unit or zero."""
-    if normals is None:
-        return torch.zeros(topology.num_vertices, 3, dtype=torch.float64)
-    if not isinstance(normals, Tensor) or tuple(normals.shape) != (topology.num_vertices, 3):
-        actual = tuple(normals.shape) if isinstance(normals, Tensor) else type(normals).__name__
-        raise ShapeError("normals", f"({topology.num_vertices}, 3), zero where none is prescribed", actual)
-    given = normals.detach().to("cpu", torch.float64)
-    lengths = given.norm(dim=1, keepdim=True)
-    if not bool(torch.isfinite(lengths).all()):
-        raise MeshError("prescribed normals must be finite; give zeros where none is prescribed")
-    inside = torch.nonzero((lengths[:, 0] > 0.0) & ~topology.is_boundary_vertex).squeeze(1).tolist()
-    if inside:
-        raise MeshError(f"normals are prescribed at boundary vertices only, not at vertices {inside[:5]}")
-    return torch.where(lengths > 0.0, given / lengths.clamp_min(1e-300), given)
+    return solved(begin, vertices, levels=levels, callback=callback)

@@ -59,7 +59,7 @@ class FormSettings:
     """
 
     curvature_weight: float = 1.0
-    fairness_weight: float = 0.3
+    fairness_weight: float = 0.5
     coarse_fairness_weight: float = 1.0
     umbrella_weight: float = 0.0
     tangential_fairness_weight: float = 0.0

@@ -78,8 +78,8 @@ class Pulls:
         return distances
 
     def terms(self, *, weight: float, as_data: bool = False) -> list[ElementTerm]:
-        """Squared distances from the aims; refreshed where they cover all vertices, unless asked for as data."""
-        if as_data or not self.everywhere:
+        """Squared distances from the aims; if they cover all vertices, refreshed, unless asked for as data."""
+        if not self.everywhere:
             chosen = self.vertices
             return handle_terms(chosen, self.aims[chosen], weight=weight * self.strength)
         every = torch.arange(self.pulled.shape[0], device=self.pulled.device)[:, None]
@@ -89,7 +89,8 @@ class Pulls:
                 pulled_offsets,
                 [("vertices", every)],
                 weight=weight,
-                refresh=self._aims_and_roots,
+                data=self._aims_and_roots({"vertices": self.aims}) if as_data else (),
+                refresh=None if as_data else self._aims_and_roots,
                 jacobian=pulled_derivatives,
                 batched=True,
             )

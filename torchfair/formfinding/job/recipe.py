@@ -61,14 +61,18 @@ class Recipe(ABC, Generic[S]):
     refuses_degenerate: ClassVar[bool] = True
 
     def __init__(self, vertices: Tensor, topology: Topology, settings: S) -> None:
-        self.given, self.topology = one_start(vertices, topology), topology.to("cpu")
+        given, self.topology = one_start(vertices, topology), topology.to("cpu")
         self.settings = settings
-        self.unit = Normalisation.of(self.given, self.topology)
-        if self.refuses_degenerate:
-            refuse_degenerate_faces(self.given, self.topology)
-        self.start = self.unit.apply(self.given)
-        self.pulls = Pulls(self.start)
         self.notes: list[str] = []
+        self.start_at(given)
+        if self.refuses_degenerate:
+            refuse_degenerate_faces(given, self.topology)
+
+    def start_at(self, vertices: Tensor) -> None:
+        """Starts from these places (V, 3) float64, in the unit of the input; before anything is pulled."""
+        self.given, self.unit = vertices, Normalisation.of(vertices, self.topology)
+        self.start = self.unit.apply(vertices)
+        self.pulls = Pulls(self.start)
 
     # ---- what is solved --------------------------------------------------------------------------------
 
@@ -79,6 +83,10 @@ class Recipe(ABC, Generic[S]):
     @abstractmethod
     def follower(self, state: State) -> Stage:
         """What one step of a live session lowers, from a state on."""
+
+    def predicted(self, state: State) -> State:
+        """Where a live step begins once handles have moved, by default where the mesh is."""
+        return state
 
     def settling(self, state: State, damping: float | None) -> Plan:
         """What a live session does once handles are let go: by default what its steps do, until one changes little.

@@ -186,13 +186,13 @@ class Session(Generic[R]):
         known = self._following
         if known is not None and not self._moved:
             return known
-        stage = self.recipe.follower(self.state)
+        stage = self.recipe.follower(self.recipe.predicted(self.state))
         stage = replace(stage, settings=replace(stage.settings, max_iterations=_ENDLESS, when_settled="stop"))
         problem = self._compiled(stage)
         if known is None:
             state = init(problem, stage.blocks, replace(stage.settings, solver="auto"))
         else:
-            state = resume(problem, known.state)
+            state = resume(problem, known.state, stage.blocks)
         self._following = _Following(stage, problem, state)
         return self._following
 

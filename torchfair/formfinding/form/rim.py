@@ -1,0 +1,84 @@
+"""What is asked of a surface along its boundary: curves and tangent planes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from ...curves import ClosedCurve
+from ...errors import MeshError, ShapeError
+from ...subdivision import Refinement
+from ...topology import Topology
+from .boundary_track import BoundaryTrack, new_boundary_vertices
+
+
+class Rim(NamedTuple):
+    """Curves and tangent planes along the boundary, in the unit of the input.
+
+    Attributes:
+        track: Boundary vertices on their curves.
+        normals: (V, 3) prescribed unit normals of boundary vertices; zero where none is.
+    """
+
+    track: BoundaryTrack
+    normals: Tensor
+
+    @classmethod
+    def of(
+        cls,
+        vertices: Tensor,
+        topology: Topology,
+        curves: Sequence[ClosedCurve] | None,
+        normals: Tensor | None,
+        corner_angle: float,
+    ) -> Rim:
+        """Given curves and normals; by default curves through the boundary ``vertices`` (V, 3), and no normals.
+
+        Raises:
+            ShapeError: normals are not ``(V, 3)``.
+            MeshError: curves do not fit the boundary, or normals are not finite or prescribed inside.
+        """
+        unit = _unit_normals(normals, topology)
+        if curves is None:
+            return cls(BoundaryTrack.through(vertices, topology, corner_angle), unit)
+        return cls(BoundaryTrack.onto(vertices, topology, curves), unit)
+
+    def refined(self, refinement: Refinement) -> Rim:
+        """On the finer mesh: new vertices lie on the curves, and have the mean normal of both ends."""
+        return Rim(self.track.refined(refinement), _refined_normals(self.normals, refinement))
+
+    def nearest(self, vertices: Tensor, *, glides: bool) -> Tensor:
+        """The vertices (V, 3), those of the boundary in their places or, gliding, in the nearest on the curves."""
+        track = self.track.updated(vertices) if glides else self.track
+        return track.positions(vertices)
+
+
+def _unit_normals(normals: Tensor | None, topology: Topology) -> Tensor:
+    """(V, 3) unit or zero."""
+    if normals is None:
+        return torch.zeros(topology.num_vertices, 3, dtype=torch.float64)
+    if not isinstance(normals, Tensor) or tuple(normals.shape) != (topology.num_vertices, 3):
+        actual = tuple(normals.shape) if isinstance(normals, Tensor) else type(normals).__name__
+        raise ShapeError("normals", f"({topology.num_vertices}, 3), zero where none is prescribed", actual)
+    given = normals.detach().to("cpu", torch.float64)
+    lengths = given.norm(dim=1, keepdim=True)
+    if not bool(torch.isfinite(lengths).all()):
+        raise MeshError("prescribed normals must be finite; give zeros where none is prescribed")
+    inside = torch.nonzero((lengths[:, 0] > 0.0) & ~topology.is_boundary_vertex).squeeze(1).tolist()
+    if inside:
+        raise MeshError(f"normals are prescribed at boundary vertices only, not at vertices {inside[:5]}")
+    return torch.where(lengths > 0.0, given / lengths.clamp_min(1e-300), given)
+
+
+def _refined_normals(normals: Tensor, refinement: Refinement) -> Tensor:
+    """Prescribed normals of the finer boundary: a new vertex has the mean of both ends if both are prescribed."""
+    ends = normals[refinement.coarse.boundary_edges]
+    mean = ends.sum(1)
+    given = (ends != 0.0).any(2).all(1) & (mean != 0.0).any(1)
+    mean = torch.where(given[:, None], mean / mean.norm(dim=1, keepdim=True), torch.zeros_like(mean))
+    result = refinement.carry_vertex_labels(normals)
+    result[new_boundary_vertices(refinement)] = mean
+    return result
