@@ -20,7 +20,9 @@ _EXACT = ProjectionSettings(
     step_tolerance=1e-12,
     least_extrapolation=math.inf,
 )
+_NEAR = replace(_EXACT, initial_damping=1e-6, step_tolerance=3e-11)  # where conditions nearly hold
 _TIGHT_STEPS = 5
+_LARGEST_DAMPING = 0.1  # where live steps were refused
 _PORTION_STEPS = 6
 _LONGEST_PULL = 3.0  # mean edge lengths that handles are pulled at once
 _MOST_PORTIONS = 12
@@ -99,13 +101,12 @@ class SymmetricPlan(Plan):
         yield from self._run(Aim.SHAPE, shape)
         if first and self._decide():
             yield from self._run(Aim.SHAPE, shape)
-        yield from self._finish()
+        yield from self._finish(shape, _EXACT)
 
-    def _finish(self) -> Stages:
+    def _finish(self, tight: ProjectionSettings, exact: ProjectionSettings) -> Stages:
         """From the shape on."""
-        tight = replace(self._problem.settings.projection, max_iterations=_TIGHT_STEPS)
-        yield from self._run(Aim.TIGHT, tight)
-        yield from self._run(Aim.EXACT, _EXACT)
+        yield from self._run(Aim.TIGHT, replace(tight, max_iterations=_TIGHT_STEPS))
+        yield from self._run(Aim.EXACT, exact)
         if largest_residual(self.state["vertices"], self._problem) > self._problem.settings.tolerance:
             yield from self._run(Aim.CONDITIONS, _EXACT)
 
@@ -152,11 +153,23 @@ class SymmetricPlan(Plan):
 
 
 class SettlingPlan(SymmetricPlan):
-    """For a mesh that has followed its handles: the first round begins where it is, with tighter conditions."""
+    """For a mesh that has followed its handles: the first round begins with tighter conditions, unless they are far.
+
+    Args:
+        problem, state, rounds: See the base class.
+        damping: Where the first run goes on.
+    """
+
+    def __init__(self, problem: SymmetricProblem, state: State, rounds: int, damping: float | None) -> None:
+        super().__init__(problem, state, rounds)
+        self._damping = damping
 
     def _round(self, *, first: bool) -> Stages:
-        if not first:
-            yield from super()._round(first=False)
+        if not first or self._farthest() > _PULLED:
+            yield from super()._round(first=first)
             return
         self._decide()
-        yield from self._finish()
+        tight = self._problem.settings.projection
+        if self._damping is not None:
+            tight = replace(tight, initial_damping=min(self._damping, _LARGEST_DAMPING))
+        yield from self._finish(tight, _NEAR)

@@ -94,6 +94,7 @@ class SymmetricProblem:
     def forget(self) -> None:
         """Makes searches for closest points anew."""
         self._planes = None if self._reference is None else TangentPlanes(self._reference)
+        self._kept: dict[tuple[object, SymmetricSettings], list[ElementTerm]] = {}
 
     # ---- stages ----------------------------------------------------------------------------------------
 
@@ -108,15 +109,17 @@ class SymmetricProblem:
     def stage(self, state: State, aim: Aim, settings: ProjectionSettings) -> Stage:
         """A run of guided projection from ``state`` on.
 
-        Terms without a weight are left out, so that stages of other ones are other problems. So are those of the
-        paper's own variables where other stars are to be saddles: slacks belong to these only.
+        Shapes that are sought, found and tightened differ in weights alone, and share one analysis. Terms without a
+        weight are left out, so that stages of others are other problems. So are those of the paper's own variables
+        where other stars are to be saddles: slacks belong to these only.
         """
+        name = aim.name if aim in (Aim.EXACT, Aim.CONDITIONS) else Aim.SHAPE.name
         weightless = [name for name, value in vars(self.settings).items() if name.endswith("_weight") and not value]
         return Stage(
-            name=" ".join([aim.name, *weightless]),
+            name=" ".join([name, *weightless]),
             blocks=state,
             terms=lambda: self.terms(aim),
-            version=self.settings,
+            version=(aim, self.settings),
             settings=replace(settings, solver=self.settings.projection.solver),
             fixed={"vertices": (self.stays | self.pulls.held)[:, None].expand(-1, 3).contiguous()},
             guard=self.admits,
@@ -128,14 +131,29 @@ class SymmetricProblem:
     def terms(self, aim: Aim) -> list[ElementTerm]:
         """Element terms of an aim."""
         settings = self.settings
-        if aim in (Aim.EXACT, Aim.CONDITIONS):
-            sides = self.sides.terms(weight=settings.saddle_weight, share=_KEPT_MARGIN) if aim is Aim.EXACT else []
-            return [*self._conditions(settings.constraint_weight), *sides]
         weight = settings.tight_weight if aim is Aim.TIGHT else settings.constraint_weight
-        everywhere = torch.arange(self.topology.num_vertices)
+        conditions = self._conditions(weight)
+        if aim is Aim.CONDITIONS:
+            return conditions
+        if aim is Aim.EXACT:
+            return [*conditions, *self._sides(share=_KEPT_MARGIN)]
+        return [*conditions, *self._sides(ahead=aim is not Aim.SEARCH), *self._same("others", self._others)]
+
+    def _same(self, name: object, make: Callable[[], list[ElementTerm]]) -> list[ElementTerm]:
+        """Terms that are the very same for all aims: what is known of them is not found again."""
+        key = (name, self.settings)
+        if key not in self._kept:
+            self._kept = {known: terms for known, terms in self._kept.items() if known[1] == self.settings}
+            self._kept[key] = make()
+        return self._kept[key]
+
+    def _sides(self, *, share: float = 1.0, ahead: bool = True) -> list[ElementTerm]:
+        weight = self.settings.saddle_weight
+        return self._same((share, ahead), lambda: self.sides.terms(weight=weight, share=share, ahead=ahead))
+
+    def _others(self) -> list[ElementTerm]:
+        settings, everywhere = self.settings, torch.arange(self.topology.num_vertices)
         return [
-            *self._conditions(weight),
-            *self.sides.terms(weight=settings.saddle_weight, ahead=aim is not Aim.SEARCH),
             *c.displacement_fairness_terms(self.base, self.topology, weight=settings.fairness_weight),
             *c.even_star_terms(self.stars, weight=settings.evenness_weight),
             *c.handle_terms(everywhere, self.base, weight=settings.anchor_weight, name="anchors"),

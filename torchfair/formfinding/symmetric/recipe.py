@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -97,13 +98,18 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
         return SymmetricPlan(self.problem, state, self.rounds or self.settings.rounds)
 
     def follower(self, state: State) -> Stage:
-        """The shape with weighted conditions; what stars are to be is decided anew whenever handles have moved."""
-        self.problem.sides.decide(state["vertices"])
-        return self.problem.stage(state, Aim.SHAPE, self.settings.projection)
+        """The shape with weighted conditions; what stars are to be is decided anew whenever handles have moved.
 
-    def settling(self, state: State) -> SettlingPlan:
-        """Conditions and saddle sides to rounding, from the shape on."""
-        return SettlingPlan(self.problem, state, self.rounds or self.settings.rounds)
+        Longer steps would carry handles past their targets.
+        """
+        self.problem.pulls.strength = 1.0
+        self.problem.sides.decide(state["vertices"])
+        settings = replace(self.settings.projection, least_extrapolation=math.inf)
+        return self.problem.stage(state, Aim.SHAPE, settings)
+
+    def settling(self, state: State, damping: float | None) -> SettlingPlan:
+        """Conditions and saddle sides to rounding, from the shape on; if that fails, the whole job."""
+        return SettlingPlan(self.problem, state, self.rounds or self.settings.rounds, damping)
 
     def state(self) -> State:
         """The start, with auxiliary variables that fit it."""
