@@ -28,13 +28,13 @@ residual       largest relative residual at the end; sides: least share of right
 from __future__ import annotations
 
 import argparse
-import copy
 import json
 import math
 import os
 import platform
 import statistics
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -42,7 +42,7 @@ from symmetric_problems import CASES, SHAPES, Handles, prepared
 from torch import Tensor
 
 import torchfair
-from torchfair.formfinding.symmetric.design import SymmetricDesign
+from torchfair.formfinding import SymmetricDesign
 from torchfair.formfinding.symmetric.measures import condition_residuals
 from torchfair.geometry import edge_lengths
 from torchfair.projection.layout import State
@@ -59,24 +59,41 @@ def largest_residual(design: SymmetricDesign, vertices: Tensor) -> float:
     return max(float(values.max()) for values in residuals.values() if values.numel())
 
 
-def edited(design: SymmetricDesign, places: Handles) -> tuple[SymmetricDesign, float, float]:
-    """A copy of the design after an edit; wall and processor seconds."""
-    answer = copy.copy(design)  # shares what is compiled
-    answer.runs = []
+@dataclass(frozen=True)
+class Answer:
+    """What an edit made of a design.
+
+    Attributes:
+        runs: Of the edit.
+        measures: Of the mesh after it.
+        residual: Largest relative residual of the conditions.
+        seconds: Wall and processor time.
+    """
+
+    runs: list[torchfair.projection.ProjectionResult]
+    measures: dict[str, float]
+    residual: float
+    seconds: tuple[float, float]
+
+
+def edited(design: SymmetricDesign, places: Handles, callback: torchfair.projection.Callback | None = None) -> Answer:
+    """An edit of the design, which is as it was before afterwards, but for what is compiled."""
+    before, first = design.session.snapshot(), len(design.runs)
     begin, processor = time.perf_counter(), time.process_time()
-    answer.move(places, rounds=1)
-    return answer, time.perf_counter() - begin, time.process_time() - processor
+    design.move(places, callback, rounds=1)
+    seconds = time.perf_counter() - begin, time.process_time() - processor
+    answer = Answer(design.runs[first:], design.measures(), largest_residual(design, design.vertices), seconds)
+    design.session.restore(before)
+    return answer
 
 
 def steps_to_residual(design: SymmetricDesign, places: Handles) -> int | None:
     """Damped steps of the edit until the largest relative residual is below 1e-6; None if it never is."""
-    answer = copy.copy(design)
-    answer.runs = []
-    problem, seen = answer.problem, [0.0]
+    problem, seen = design.session.recipe.problem, [0.0]
     admits = problem.admits
 
     def watched(state: State, trial: State) -> bool:
-        seen[-1] = largest_residual(answer, state["vertices"])  # of the best state after so many steps
+        seen[-1] = largest_residual(design, state["vertices"])  # of the best state after so many steps
         return admits(state, trial)
 
     def count(record: torchfair.projection.IterationRecord) -> bool:
@@ -86,10 +103,9 @@ def steps_to_residual(design: SymmetricDesign, places: Handles) -> int | None:
 
     problem.admits = watched  # type: ignore[method-assign]
     try:
-        answer.move(places, count, rounds=1)
+        seen[-1] = edited(design, places, count).residual
     finally:
         problem.admits = admits  # type: ignore[method-assign]
-    seen[-1] = largest_residual(answer, answer.vertices)
     left = next((step for step, value in enumerate(seen) if value >= WANTED), 0)  # the first steps may be rejected
     return next((step for step in range(left, len(seen)) if seen[step] < WANTED), None)
 
@@ -108,17 +124,12 @@ class Edits:
             x, y, z = handles[vertex]
             stretch = 1.0 + outwards * step / math.hypot(x, y)
             self.places.append({**handles, vertex: [stretch * x, stretch * y, z + upwards * step]})
-        self.times: list[list[list[float]]] = []
+        self.times: list[list[tuple[float, float]]] = []
 
     def run(self) -> None:
         """Every edit once."""
-        self.answers, self.measures, times = [], [], []
-        for places in self.places:
-            answer, *seconds = edited(self.design, places)
-            self.answers.append(answer)
-            self.measures.append(answer.measures())  # now: targets of handles are shared by all answers
-            times.append(seconds)
-        self.times.append(times)
+        self.answers = [edited(self.design, places) for places in self.places]
+        self.times.append([answer.seconds for answer in self.answers])
 
     def row(self) -> dict[str, object]:
         """Figures; times are the least of the repetitions of an edit."""
@@ -126,18 +137,18 @@ class Edits:
         seconds = [[min(times) for times in zip(*edit, strict=True)] for edit in zip(*self.times, strict=True)]
         wall, processor = zip(*seconds, strict=True)
         engine = sum(run.timings["total"] for answer in self.answers for run in answer.runs)
-        measures = self.measures
+        measures = [answer.measures for answer in self.answers]
         away = [m["largest_handle_distance"] / m["mean_edge_length"] for m in measures]
         return {
             "vertices": self.size,
             "formulation": self.formulation,
-            "unknowns": sum(block.numel() for block in self.design.problem.blocks(self.design.problem.base).values()),
+            "unknowns": sum(block.numel() for block in self.design.session.state.values()),
             "steps": steps,
             "steps_to_1e-6": [steps_to_residual(self.design, places) for places in self.places],
             "answer_s": wall,
             "answer_processor_s": processor,
             "step_s": engine / sum(steps),
-            "largest_residual": max(largest_residual(answer, answer.vertices) for answer in self.answers),
+            "largest_residual": max(answer.residual for answer in self.answers),
             "saddle_side_share": min(m["saddle_side_share"] for m in measures),
             "crossing_pyramids_negative": max(m["crossing_pyramids_negative"] for m in measures),
             "largest_handle_distance": max(away),
@@ -208,7 +219,7 @@ def table_20(figures: list[str], formulations: list[str], steps: int) -> list[di
             design.move(handles)
             taken = sum(run.iterations for run in design.runs)
             seconds = sum(run.timings["total"] for run in design.runs) / taken
-            variables = sum(block.numel() for block in design.problem.blocks(design.problem.base).values())
+            variables = sum(block.numel() for block in design.session.state.values())
             mesh, stars = design.topology, design.stars.vertices.shape[0]
             rows.append({
                 "figure": figure, "vertices": mesh.num_vertices, "edges": mesh.num_edges, "faces": mesh.num_faces,

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import torch
 
-from torchfair.formfinding import SymmetricSettings
-from torchfair.formfinding.symmetric.design import SymmetricDesign
+from torchfair.formfinding import SymmetricDesign, SymmetricSettings
 from torchfair.principal import principal_edges_of_lattice
 from torchfair.shapes import Catenoid, Surface, Torus, principal_triangles
 

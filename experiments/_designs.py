@@ -13,8 +13,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.cameras import Camera
-from torchfair.formfinding import strip_normals
-from torchfair.formfinding.symmetric.design import SymmetricDesign
+from torchfair.formfinding import SymmetricDesign, strip_normals
 from torchfair.geometry import edge_lengths
 from torchfair.principal import (
     DevelopableStrips,

@@ -30,8 +30,7 @@ from _designs import (
 )
 from torch import Tensor
 
-from torchfair.formfinding import SymmetricSettings
-from torchfair.formfinding.symmetric.design import SymmetricDesign
+from torchfair.formfinding import SymmetricDesign, SymmetricSettings
 from torchfair.geometry import gauss_image
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.shapes import Catenoid, ShapeMesh, principal_triangles

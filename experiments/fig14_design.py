@@ -39,8 +39,7 @@ from _reflected_designs import (
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.formfinding import SymmetricSettings
-from torchfair.formfinding.symmetric.design import SymmetricDesign
+from torchfair.formfinding import SymmetricDesign, SymmetricSettings
 from torchfair.geometry import planarity
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.shapes import ShapeMesh, Torus, principal_triangles

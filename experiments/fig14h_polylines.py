@@ -27,8 +27,7 @@ from _reflected_designs import (
 )
 from torch import Tensor
 
-from torchfair.formfinding import SymmetricSettings
-from torchfair.formfinding.symmetric.design import SymmetricDesign
+from torchfair.formfinding import SymmetricDesign, SymmetricSettings
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.shapes import ShapeMesh, Torus, principal_triangles
 from torchfair.viewing import ViewDirection

@@ -21,7 +21,7 @@ from torchfair.formfinding import (
     JobResult,
     Level,
     SymmetricDesign,
-    SymmetricResult,
+    SymmetricLevel,
     SymmetricSettings,
     minimise_absolute_curvature,
     minimise_normal_variation,
@@ -211,10 +211,11 @@ def torus() -> tuple[Tensor, PrincipalEdges, dict[int, list[float]]]:
 
 def contents(design: SymmetricDesign) -> dict[str, object]:
     """Everything that an edit may change."""
-    problem = design.problem
-    state = {"vertices": design.vertices, "targets": design.targets, **design._state, **vars(problem.sides)}
+    session = design.session
+    pulls, sides = vars(session.recipe.pulls), vars(session.recipe.problem.sides)
+    state = {"places": design.vertices, **session.state, **pulls, **sides}
     copies = {name: value.clone() if isinstance(value, Tensor) else value for name, value in state.items()}
-    return {**copies, "pull": problem.pull, "runs": len(design.runs)}
+    return {**copies, "runs": len(design.runs)}
 
 
 def assert_equal(found: dict[str, object], expected: dict[str, object]) -> None:
@@ -267,26 +268,26 @@ def test_a_callback_that_raises_leaves_a_design_as_it_was(
 
 SYMMETRIC = SymmetricSettings(rounds=2, most_steps=30)
 SYMMETRIC_PHASES = {
-    "handles": ("symmetric.recipe:read_handles", 1, 0),
-    "measuring the start": ("symmetric.design:symmetric_measures", 1, 0),
+    "handles": ("job.recipe:read_handles", 1, 0),
+    "measuring the start": ("symmetric.recipe:symmetric_measures", 1, 0),
     "snapshot": ("symmetric.problem:SymmetricProblem.snapshot", 1, 0),
-    "first decision": ("symmetric.rounds:SymmetricRounds._decide", 1, 0),
-    "first compiled": ("symmetric.problem:GuidedProjection", 1, 0),
-    "second compiled": ("symmetric.problem:GuidedProjection", 2, 1),
-    "second decision": ("symmetric.rounds:SymmetricRounds._decide", 2, 1),
-    "score": ("symmetric.rounds:SymmetricRounds._score", 1, 1),
-    "measuring the result": ("symmetric.design:symmetric_measures", 2, 1),
-    "normals": ("symmetric.design:strip_normals", 1, 1),
-    "refinement": ("symmetric.design:loop", 1, 1),
-    "finer problem": ("symmetric.design:SymmetricProblem", 2, 1),
-    "measuring the finer start": ("symmetric.design:symmetric_measures", 3, 1),
+    "first decision": ("symmetric.plan:SymmetricPlan._decide", 1, 0),
+    "first compiled": ("job.session:GuidedProjection", 1, 0),
+    "second compiled": ("job.session:GuidedProjection", 2, 1),
+    "second decision": ("symmetric.plan:SymmetricPlan._decide", 2, 1),
+    "score": ("symmetric.plan:SymmetricPlan._score", 1, 1),
+    "measuring the result": ("symmetric.recipe:symmetric_measures", 2, 1),
+    "normals": ("symmetric.recipe:strip_normals", 1, 1),
+    "refinement": ("symmetric.refinement:loop", 1, 1),
+    "finer problem": ("symmetric.recipe:SymmetricProblem", 2, 1),
+    "measuring the finer start": ("symmetric.recipe:symmetric_measures", 3, 1),
     "finer snapshot": ("symmetric.problem:SymmetricProblem.snapshot", 2, 1),
-    "measuring the finer result": ("symmetric.design:symmetric_measures", 4, 2),
+    "measuring the finer result": ("symmetric.recipe:symmetric_measures", 4, 2),
 }
 
 
 @pytest.fixture(scope="module")
-def whole() -> SymmetricResult:
+def whole() -> JobResult[SymmetricLevel]:
     """Of the design below, undisturbed."""
     vertices, edges, handles = torus()
     return principal_symmetric(vertices, edges, handles=handles, levels=1, settings=SYMMETRIC)
@@ -295,7 +296,7 @@ def whole() -> SymmetricResult:
 @WAYS
 @pytest.mark.parametrize("phase", SYMMETRIC_PHASES)
 def test_a_design_keeps_the_levels_done(
-    phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, whole: SymmetricResult
+    phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, whole: JobResult[SymmetricLevel]
 ) -> None:
     vertices, edges, handles = torus()
     place, n, done = SYMMETRIC_PHASES[phase]

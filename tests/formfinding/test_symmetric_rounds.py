@@ -6,40 +6,47 @@ import pytest
 import torch
 from helpers import DOUBLE
 
-from torchfair.formfinding import SymmetricDesign, SymmetricSettings
+from torchfair.formfinding import Session, SymmetricRecipe, SymmetricSettings
+from torchfair.formfinding.job import session as module
+from torchfair.formfinding.job.plan import Stages
+from torchfair.formfinding.symmetric.plan import SymmetricPlan
 from torchfair.formfinding.symmetric.problem import Aim
-from torchfair.formfinding.symmetric.rounds import SymmetricRounds
+from torchfair.formfinding.symmetric.score import Score
 from torchfair.principal import principal_edges_of_lattice
+from torchfair.projection import GuidedProjection
 from torchfair.shapes import Torus, principal_triangles
 
 
-def design(formulation: str = "spheres", handles: tuple[int, ...] = ()) -> SymmetricDesign:
+def recipe(formulation: str = "spheres") -> SymmetricRecipe:
     mesh = principal_triangles(Torus(2.0, 1.0), 10, 14, along="u")
     edges = principal_edges_of_lattice(mesh, "u")
-    return SymmetricDesign(mesh.vertices, edges, handles=handles, settings=SymmetricSettings(formulation=formulation))
+    return SymmetricRecipe(mesh.vertices, edges, settings=SymmetricSettings(formulation=formulation))
 
 
-class Rounds(SymmetricRounds):
+class Rounds(SymmetricPlan):
     """Rounds that do nothing, and come out with the scores given."""
 
     scores: list[tuple[float, int]]
     seen: list[tuple[float, float]]
 
-    def _round(self, *, first: bool) -> bool:
-        self.seen.append((self.problem.pull, self.problem.sides.margin))
-        return False
+    def _round(self, *, first: bool) -> Stages:
+        self.seen.append((self._problem.pulls.strength, self._problem.sides.margin))
+        yield from ()
 
-    def _score(self) -> tuple[float, int]:
-        return self.scores[len(self.seen) - 1]
+    def _score(self) -> Score:
+        return Score(*self.scores[len(self.seen) - 1])
 
 
 def rounds(scores: list[tuple[float, int]], pull: float) -> list[list[float]]:
     """Pulls and margins of all rounds, with a handle that is ``pull`` mean edges away from its target."""
-    edited = design(handles=(3,))
-    edited.problem.targets = edited.problem.targets + torch.tensor([0.0, 0.0, pull], dtype=DOUBLE)
-    work = Rounds(edited.problem, edited.principal, edited._state, None)
+    job = recipe()
+    far = job.start[3] + torch.tensor([0.0, 0.0, pull], dtype=DOUBLE)
+    job.pull({3: job.unit.invert(far).tolist()})
+    work = Rounds(job.problem, job.state(), len(scores))
     work.scores, work.seen = scores, []
-    work.run(len(scores), settled=False)
+    assert not list(work.stages())
+    work.best()
+    assert job.pulls.strength == 1.0
     return [list(column) for column in zip(*work.seen, strict=True)]
 
 
@@ -74,20 +81,41 @@ def test_rounds_end_when_all_is_right() -> None:
     assert len(rounds([(1.0, 0), (met, 0), (met, 0)], 2.0)[0]) == 2
 
 
-def test_problems_are_compiled_once_for_every_aim() -> None:
-    problem = design().problem
-    assert problem.compiled(Aim.SHAPE) is problem.compiled(Aim.SHAPE)
-    assert problem.compiled(Aim.SHAPE) is not problem.compiled(Aim.EXACT)
+def test_one_analysis_serves_all_shapes_and_edits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shapes sought, found and tightened differ in weights; conditions with and without sides are other problems."""
+    made: list[int] = []
+    monkeypatch.setattr(module, "GuidedProjection", lambda *a, **k: made.append(1) or GuidedProjection(*a, **k))
+    session = Session(recipe())
+    for stretch in (1.3, 1.1):
+        session.move({3: (stretch * session.recipe.given[3]).tolist()})
+        session.solve()
+        assert len(made) <= 3
+    assert len(session.runs) >= 6
+
+
+def test_other_weights_act_in_the_next_solve() -> None:
+    places = []
+    for fairness in (1.0, 1e3):
+        session = Session(recipe())
+        session.move({3: (1.1 * session.recipe.given[3]).tolist()})
+        session.solve()
+        session.weigh(fairness=fairness)
+        session.move({3: (1.15 * session.recipe.given[3]).tolist()})
+        session.solve()
+        places.append(session.vertices)
+    assert not torch.allclose(*places, rtol=0.0, atol=1e-4)
 
 
 def test_terms_of_the_papers_own_variables_follow_what_stars_are_to_be() -> None:
     """Their slacks belong to saddles only, so that another decision makes another problem."""
-    problem = design("lifted").problem
-    counts = []
+    job = recipe("lifted")
+    problem, counts = job.problem, []
     noise = torch.randn(problem.base.shape, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
     for share in (0.0, 0.1):
         problem.sides.decide(problem.base + share * noise)
-        (sides,) = (term for term in problem.compiled(Aim.SHAPE).terms if term.name == "saddle side")
+        stage = problem.stage(job.state(), Aim.SHAPE, job.settings.projection)
+        (sides,) = (term for term in stage.terms() if term.name == "saddle side")
+        assert stage.anew
         assert sides.num_elements == int(problem.sides.is_saddle.sum())
         counts.append(sides.num_elements)
     assert counts[0] != counts[1]

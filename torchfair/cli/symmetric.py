@@ -17,7 +17,7 @@ from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edge
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from ..formfinding import JobResult
+    from ..formfinding import JobResult, SymmetricLevel
 
 
 def _principal(path: Path, request: Request, result: Any, overwrite: bool) -> None:
@@ -61,12 +61,11 @@ class SymmetricCommand(JobCommand):
 
         return SymmetricSettings
 
-    def function(self) -> Callable[..., JobResult[Any]]:
+    def function(self) -> Callable[..., JobResult[SymmetricLevel]]:
         """See the base class."""
         from ..formfinding import principal_symmetric
-        from .older_results import as_job
 
-        return as_job(principal_symmetric)
+        return principal_symmetric
 
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh with principal edges, handles, a reference, and strips to make."""

@@ -27,7 +27,7 @@ from .symmetric.design import SymmetricDesign as SymmetricDesign
 from .symmetric.measures import condition_residuals as condition_residuals
 from .symmetric.measures import symmetric_measures as symmetric_measures
 from .symmetric.recipe import SymmetricLevel as SymmetricLevel
-from .symmetric.recipe import SymmetricResult as SymmetricResult
+from .symmetric.recipe import SymmetricRecipe as SymmetricRecipe
 from .symmetric.recipe import principal_symmetric as principal_symmetric
 from .symmetric.settings import SymmetricSettings as SymmetricSettings
 from .symmetric.strip_normals import strip_normals as strip_normals

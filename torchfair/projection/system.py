@@ -66,6 +66,8 @@ class Structure:
         single: Structure | None = None,
     ) -> None:
         self.layout, self.free, self._single = layout, free, single
+        self._linear: list[CompiledTerm] = []
+        self.affine: AffinePart | None = None
         self._take([CompiledTerm(term, layout) for term in self._checked(terms)], dtype)
         self._like = torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device)
         self._mask()
@@ -82,7 +84,10 @@ class Structure:
     def _take(self, compiled: list[CompiledTerm], dtype: torch.dtype) -> None:
         self.terms = [c.term for c in compiled]
         self.compiled = [c for c in compiled if not c.term.linear]
-        self._linear = [c for c in compiled if c.term.linear]
+        linear = [c for c in compiled if c.term.linear]
+        if [id(c.term) for c in linear] == [id(c.term) for c in self._linear]:
+            return  # the same system
+        self._linear = linear
         self.affine = AffinePart(self._linear, self.layout, self.free, dtype) if self._linear else None
 
     def with_terms(self, terms: Sequence[ElementTerm]) -> Structure:

@@ -82,6 +82,10 @@ class Pulls:
         if not self.everywhere:
             chosen = self.vertices
             return handle_terms(chosen, self.aims[chosen], weight=weight * self.strength)
+        return self.refreshed_terms(weight=weight)
+
+    def refreshed_terms(self, *, weight: float) -> list[ElementTerm]:
+        """Those of all vertices, which see other handles, aims and strengths by themselves."""
         every = torch.arange(self.pulled.shape[0], device=self.pulled.device)[:, None]
         return [
             ElementTerm(

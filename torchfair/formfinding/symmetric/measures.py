@@ -10,12 +10,13 @@ from torch import Tensor
 from ...constraints.principal_symmetric import between_stars, star_numbers, star_stencil
 from ...constraints.saddle_sides import beyond_tangent_plane, is_negative
 from ...energies import normal_variation, total_absolute_curvature
-from ...geometry import corner_angles, edge_lengths
+from ...geometry import corner_angles, edge_lengths, face_normals
 from ...geometry._ops import cross, dot
 from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
 from ...principal.spheres import star_spheres
 from ...stars import pyramid_self_intersections
+from ...topology import Topology
 
 
 def condition_residuals(vertices: Tensor, principal: PrincipalEdges, stars: PrincipalStars) -> dict[str, Tensor]:
@@ -51,7 +52,8 @@ def symmetric_measures(
         the tangent plane (1 if there are none). ``crossing_pyramids_negative`` and ``crossing_pyramids``: negative
         stars, and all interior vertices, whose normal pyramid intersects itself. ``normal_variation`` (E) and
         ``total_absolute_curvature`` (C) and their quotient ``energy_over_curvature``; ``mean_edge_length``;
-        ``smallest_angle_degrees``; ``largest_handle_distance``.
+        ``smallest_angle_degrees``; ``flipped_faces``: those that look the other way than the faces beside them;
+        ``largest_handle_distance``.
     """
     topology = principal.topology
     residuals = condition_residuals(vertices, principal, stars)
@@ -76,5 +78,15 @@ def symmetric_measures(
         "energy_over_curvature": energy / curvature if curvature > 0.0 else math.nan,
         "mean_edge_length": float(edge_lengths(vertices, topology).mean()),
         "smallest_angle_degrees": math.degrees(float(angles.min())),
+        "flipped_faces": float(_flipped(vertices, topology).sum()),
         "largest_handle_distance": float(away.max()) if away.numel() else 0.0,
     }
+
+
+def _flipped(vertices: Tensor, topology: Topology) -> Tensor:
+    """(F,) bool: faces whose normal points against the sum of those of the faces beside them."""
+    normals, pairs = face_normals(vertices, topology), topology.interior_edge_faces
+    around = torch.zeros_like(normals)
+    for one, other in (pairs.unbind(1), pairs.flip(1).unbind(1)):
+        around.index_add_(0, one, normals[other])
+    return dot(normals, around) < 0.0

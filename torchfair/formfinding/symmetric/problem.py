@@ -1,10 +1,11 @@
-"""The problem of a principal-symmetric mesh on one level of refinement, compiled once for many edits."""
+"""The terms, fixed vertices and guards of the design of principal-symmetric meshes."""
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from enum import Enum
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -12,7 +13,6 @@ from torch import Tensor
 from ... import constraints as c
 from ...constraints.closeness import TangentPlanes
 from ...constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
-from ...constraints.handles import offset
 from ...constraints.lifted_principal_symmetric import lifted_blocks, lifted_principal_symmetric_terms
 from ...constraints.principal_symmetric import between_stars, sphere_blocks
 from ...constraints.saddle_sides import SaddleSides
@@ -20,9 +20,11 @@ from ...geometry import corner_angles
 from ...geometry.closest_point import ReferenceSurface
 from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
-from ...projection import ElementTerm, GuidedProjection
+from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ..face_guard import FaceGuard
+from ..job.plan import Stage
+from ..job.pulls import Pulls
 from .settings import SymmetricSettings
 
 _SAFE_ANGLE = 2.5  # smallest angles at which the barrier sets in
@@ -40,20 +42,18 @@ class Aim(Enum):
 
 
 class SymmetricProblem:
-    """Terms and compiled runs for one mesh in normalised units.
+    """Everything guided projection needs for one mesh in normalised units.
 
     Args:
         base: (V, 3) where fairness wants to see the displacement zero.
         principal: Which edges are principal.
         stars: Where conditions are imposed.
-        handles: (n,) vertices that are pulled.
-        fixed: (V,) vertices that do not move.
+        stays: (V,) bool, vertices that do not move.
+        pulls: Handles and held vertices.
         reference: Surface to stay close to.
         settings: Weights.
 
     Attributes:
-        targets: (n, 3) of the handles; assign to move them.
-        pull: Factor of the weight of handles.
         sides: What stars are to be; see :class:`~torchfair.constraints.saddle_sides.SaddleSides`.
     """
 
@@ -62,45 +62,41 @@ class SymmetricProblem:
         base: Tensor,
         principal: PrincipalEdges,
         stars: PrincipalStars,
-        handles: Tensor,
-        fixed: Tensor,
+        stays: Tensor,
+        pulls: Pulls,
         reference: ReferenceSurface | None,
         settings: SymmetricSettings,
     ) -> None:
-        self.base, self.topology, self.stars, self.settings = base, principal.topology, stars, settings
-        self.handles, self.fixed, self.targets = handles, fixed, base[handles]
-        self.pull = 1.0
+        self.base, self.principal, self.stars, self.settings = base, principal, stars, settings
+        self.topology, self.stays, self.pulls = principal.topology, stays, pulls
         self.edges = between_stars(self.topology.edges[principal.mask], stars)
         self.sides = SaddleSides(stars, margin=settings.saddle_margin)
         self._reference = reference
-        self._compiled: dict[Aim, GuidedProjection] = {}
-        self.forget_compiled()
+        self.forget()
         self._angles = corner_angles(base, self.topology)
         self._smallest_angle = min(settings.smallest_angle, 0.8 * float(self._angles.min()))
         self._keeps_faces = FaceGuard(self.topology, lambda state: state["vertices"])
 
+    @property
+    def has_other_goals(self) -> bool:
+        """Whether more is asked for than conditions and handles: closeness or E."""
+        return self._reference is not None or self.settings.energy_weight > 0.0
+
+    def pull_fully(self) -> None:
+        """Aims at the targets of handles themselves, with their full weight."""
+        self.pulls.aims, self.pulls.strength = self.pulls.targets.clone(), 1.0
+
     def snapshot(self) -> Callable[[], None]:
-        """A function that puts targets, pull and saddle sides back to what they are now.
+        """A function that puts saddle sides back to what they are now."""
+        saved = _copied(vars(self.sides))
+        return lambda: vars(self.sides).update(_copied(saved))
 
-        Linear solvers too: those that fell back to double precision would go on in it, and round differently.
-        """
-        targets, pull, sides, compiled = self.targets.clone(), self.pull, self.sides, dict(self._compiled)
-        saved = {name: value.clone() if isinstance(value, Tensor) else value for name, value in vars(sides).items()}
-
-        solvers = {aim: copy.copy(problem.solver) for aim, problem in compiled.items()}
-
-        def restore() -> None:
-            self.targets, self.pull, self._compiled = targets, pull, compiled
-            for aim, solver in solvers.items():
-                compiled[aim].solver = solver
-            vars(sides).update(saved)
-
-        return restore
-
-    def forget_compiled(self) -> None:
-        """Compiles anew from now on: what was interrupted while it searched or factorised may not be whole."""
-        self._compiled = {}
+    def forget(self) -> None:
+        """Makes searches for closest points anew."""
         self._planes = None if self._reference is None else TangentPlanes(self._reference)
+        self._kept: dict[tuple[object, SymmetricSettings], list[ElementTerm]] = {}
+
+    # ---- stages ----------------------------------------------------------------------------------------
 
     def blocks(self, vertices: Tensor) -> State:
         """Variable blocks that fit ``vertices``."""
@@ -110,32 +106,58 @@ class SymmetricProblem:
             return {"vertices": vertices, **lifted_blocks(vertices, self.edges, self.stars)}
         return {"vertices": vertices}
 
-    def compiled(self, aim: Aim) -> GuidedProjection:
-        """The run of an aim, with its symbolic analysis made once."""
-        if aim not in self._compiled or self.settings.formulation == "lifted":
-            self._compiled[aim] = GuidedProjection(
-                self.blocks(self.base),
-                self.terms(aim),
-                fixed={"vertices": self.fixed[:, None].expand(-1, 3).contiguous()},
-                solver=self.settings.projection.solver,
-            )
-        return self._compiled[aim]
+    def stage(self, state: State, aim: Aim, settings: ProjectionSettings) -> Stage:
+        """A run of guided projection from ``state`` on.
+
+        Shapes that are sought, found and tightened differ in weights alone, and share one analysis. Terms without a
+        weight are left out, so that stages of others are other problems. So are those of the paper's own variables
+        where other stars are to be saddles: slacks belong to these only.
+        """
+        name = aim.name if aim in (Aim.EXACT, Aim.CONDITIONS) else Aim.SHAPE.name
+        weightless = [name for name, value in vars(self.settings).items() if name.endswith("_weight") and not value]
+        return Stage(
+            name=" ".join([name, *weightless]),
+            blocks=state,
+            terms=lambda: self.terms(aim),
+            version=(aim, self.settings),
+            settings=replace(settings, solver=self.settings.projection.solver),
+            fixed={"vertices": (self.stays | self.pulls.held)[:, None].expand(-1, 3).contiguous()},
+            guard=self.admits,
+            anew=self.settings.formulation == "lifted",
+        )
+
+    # ---- terms -----------------------------------------------------------------------------------------
 
     def terms(self, aim: Aim) -> list[ElementTerm]:
         """Element terms of an aim."""
         settings = self.settings
-        if aim in (Aim.EXACT, Aim.CONDITIONS):
-            sides = self.sides.terms(weight=settings.saddle_weight, share=_KEPT_MARGIN) if aim is Aim.EXACT else []
-            return [*self._conditions(settings.constraint_weight), *sides]
         weight = settings.tight_weight if aim is Aim.TIGHT else settings.constraint_weight
-        everywhere = torch.arange(self.topology.num_vertices)
+        conditions = self._conditions(weight)
+        if aim is Aim.CONDITIONS:
+            return conditions
+        if aim is Aim.EXACT:
+            return [*conditions, *self._sides(share=_KEPT_MARGIN)]
+        return [*conditions, *self._sides(ahead=aim is not Aim.SEARCH), *self._same("others", self._others)]
+
+    def _same(self, name: object, make: Callable[[], list[ElementTerm]]) -> list[ElementTerm]:
+        """Terms that are the very same for all aims: what is known of them is not found again."""
+        key = (name, self.settings)
+        if key not in self._kept:
+            self._kept = {known: terms for known, terms in self._kept.items() if known[1] == self.settings}
+            self._kept[key] = make()
+        return self._kept[key]
+
+    def _sides(self, *, share: float = 1.0, ahead: bool = True) -> list[ElementTerm]:
+        weight = self.settings.saddle_weight
+        return self._same((share, ahead), lambda: self.sides.terms(weight=weight, share=share, ahead=ahead))
+
+    def _others(self) -> list[ElementTerm]:
+        settings, everywhere = self.settings, torch.arange(self.topology.num_vertices)
         return [
-            *self._conditions(weight),
-            *self.sides.terms(weight=settings.saddle_weight, ahead=aim is not Aim.SEARCH),
             *c.displacement_fairness_terms(self.base, self.topology, weight=settings.fairness_weight),
             *c.even_star_terms(self.stars, weight=settings.evenness_weight),
             *c.handle_terms(everywhere, self.base, weight=settings.anchor_weight, name="anchors"),
-            *self._handles(),
+            *self.pulls.refreshed_terms(weight=settings.handle_weight),
             *self._closeness(),
             *self._energy(),
             *self._quality(),
@@ -149,20 +171,6 @@ class SymmetricProblem:
         return [
             *c.cospherical_terms(self.stars, weight=weight),
             *c.coplanar_terms(self.edges, self.stars, weight=weight),
-        ]
-
-    def _handles(self) -> list[ElementTerm]:
-        if not self.handles.numel():
-            return []
-        stencil = [("vertices", self.handles[:, None])]
-        return [
-            ElementTerm(
-                "handles",
-                pulled_offset,
-                stencil,
-                weight=self.settings.handle_weight,
-                refresh=lambda state: (self.targets, self.targets.new_full(self.handles.shape, self.pull)),
-            )
         ]
 
     def _closeness(self) -> list[ElementTerm]:
@@ -186,6 +194,8 @@ class SymmetricProblem:
         safe = self._angles.clamp(max=_SAFE_ANGLE * smallest).clamp_min(1.1 * smallest)
         return c.corner_angle_terms(self.topology, smallest, safe, weight=0.1)
 
+    # ---- guard -----------------------------------------------------------------------------------------
+
     def admits(self, state: State, trial: State) -> bool:
         """Whether a step may be taken: no face turns over, and no angle falls below its bound."""
         if not self._keeps_faces(state, trial):
@@ -193,6 +203,5 @@ class SymmetricProblem:
         return float(corner_angles(trial["vertices"], self.topology).min()) > self._smallest_angle
 
 
-def pulled_offset(x: Tensor, target: Tensor, pull: Tensor) -> Tensor:
-    """From the target to the vertex ``x`` (1, 3), times the square root of ``pull``."""
-    return pull.sqrt() * offset(x, target)
+def _copied(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value.clone() if isinstance(value, Tensor) else value for name, value in values.items()}

@@ -2,91 +2,169 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import torch
 from torch import Tensor
 
-from ..._interrupts import deferred_interrupts
+from ...errors import MeshError
+from ...geometry.closest_point import ReferenceSurface
 from ...principal import PrincipalEdges
+from ...principal.principal_edges import PrincipalStars
 from ...projection import Callback, ProjectionResult
+from ...projection.layout import State
 from ...topology import Topology
-from ..handles import read_handles
-from ..stopping import interrupted, interrupted_at_the_start
-from .design import SymmetricDesign
+from ..checks import one_start
+from ..job import JobResult, Level, Promise, Recipe, Stage, solved
+from .measures import symmetric_measures
+from .plan import SettlingPlan, SymmetricPlan
+from .problem import Aim, SymmetricProblem
+from .promises import symmetric_promises
+from .refinement import refined
 from .settings import SymmetricSettings
+from .strip_normals import strip_normals
 
 
 @dataclass(frozen=True)
-class SymmetricLevel:
+class SymmetricLevel(Level):
     """The mesh of one level of refinement.
 
     Attributes:
-        vertices: (V, 3) in the unit and dtype of the input.
-        principal: Its principal edges, and with them its topology.
+        principal: Its principal edges.
         normals: (V, 3) unit normals n(v), see :func:`strip_normals`.
-        before, after: Measures of success, see
-            :func:`~torchfair.formfinding.symmetric_measures`; ``before`` is at the start of the level.
-        runs: Runs of guided projection, in order, in normalised units. Merits fall within a run.
     """
 
-    vertices: Tensor
     principal: PrincipalEdges
     normals: Tensor
-    before: dict[str, float]
-    after: dict[str, float]
-    runs: list[ProjectionResult]
-
-    @property
-    def steps(self) -> int:
-        """Damped steps taken on this level."""
-        return sum(run.iterations for run in self.runs)
 
 
-@dataclass(frozen=True)
-class SymmetricResult:
-    """Principal-symmetric meshes, from coarse to fine.
+class SymmetricRecipe(Recipe[SymmetricSettings]):
+    """Makes a triangle mesh principal-symmetric; see :func:`principal_symmetric`.
+
+    Args:
+        vertices, principal, fixed, reference, on, settings: See :func:`principal_symmetric`.
+        handles: Likewise; more of them may be pulled later.
 
     Attributes:
-        levels: One for every level; the first has the vertices of the input.
-        notes: Decisions taken and conditions missed, in words.
-        stopped: Whether Ctrl-C or the callback ended it early; the last level is the best state found,
-            or was finished before.
+        principal: Which edges are principal.
+        stars: Where conditions are imposed.
+        reference: Vertices and topology of a surface to stay close to.
+        rounds: How often a shape is looked for at most; None for as often as the settings say.
     """
 
-    levels: list[SymmetricLevel]
-    notes: list[str]
-    stopped: bool
+    name = "symmetric"
 
-    @property
-    def vertices(self) -> Tensor:
-        """(V', 3) of the finest level."""
-        return self.levels[-1].vertices
+    def __init__(
+        self,
+        vertices: Tensor,
+        principal: PrincipalEdges,
+        *,
+        handles: Mapping[int, Sequence[float]] | None = None,
+        fixed: Tensor | None = None,
+        reference: tuple[Tensor, Topology] | None = None,
+        on: Tensor | None = None,
+        settings: SymmetricSettings | None = None,
+    ) -> None:
+        self.principal = principal.to("cpu")
+        super().__init__(vertices, self.principal.topology, settings or SymmetricSettings())
+        self.stars = _chosen(self.principal.stars(), on)
+        self.reference = reference
+        self.rounds: int | None = None
+        surface = None
+        if reference is not None:
+            surface = ReferenceSurface(self.unit.apply(one_start(*reference)), reference[1].to("cpu"))
+        self.problem = SymmetricProblem(
+            self.start, self.principal, self.stars, self._fixed(fixed), self.pulls, surface, self.settings
+        )
+        self.pull(handles or {})
 
-    @property
-    def topology(self) -> Topology:
-        """Of the finest level."""
-        return self.levels[-1].principal.topology
+    def take_settings(self, settings: SymmetricSettings) -> None:
+        """Takes other weights."""
+        super().take_settings(settings)
+        self.problem.settings = settings
 
-    @property
-    def principal(self) -> PrincipalEdges:
-        """Of the finest level."""
-        return self.levels[-1].principal
+    def check_pulls(self, vertices: Tensor, targets: Tensor) -> None:
+        """Handles on fixed vertices are refused."""
+        fixed = vertices[self.stays()[vertices]].tolist()
+        if fixed:
+            raise MeshError(f"handles {fixed[:10]} are fixed: free them, or move them before")
 
-    @property
-    def projection(self) -> ProjectionResult:
-        """The last run."""
-        return self.levels[-1].runs[-1]
+    # ---- what is solved --------------------------------------------------------------------------------
 
-    @property
-    def before(self) -> dict[str, float]:
-        """Measures of the input."""
-        return self.levels[0].before
+    def plan(self, state: State) -> SymmetricPlan:
+        """Rounds until conditions and saddle sides are right."""
+        return SymmetricPlan(self.problem, state, self.rounds or self.settings.rounds)
 
-    @property
-    def after(self) -> dict[str, float]:
-        """Measures of the finest level."""
-        return self.levels[-1].after
+    def follower(self, state: State) -> Stage:
+        """The shape with weighted conditions; what stars are to be is decided anew whenever handles have moved.
+
+        Longer steps would carry handles past their targets.
+        """
+        self.problem.pulls.strength = 1.0
+        self.problem.sides.decide(state["vertices"])
+        settings = replace(self.settings.projection, least_extrapolation=math.inf)
+        return self.problem.stage(state, Aim.SHAPE, settings)
+
+    def settling(self, state: State, damping: float | None) -> SettlingPlan:
+        """Conditions and saddle sides to rounding, from the shape on; if that fails, the whole job."""
+        return SettlingPlan(self.problem, state, self.rounds or self.settings.rounds, damping)
+
+    def state(self) -> State:
+        """The start, with auxiliary variables that fit it."""
+        return self.problem.blocks(self.start)
+
+    def stays(self) -> Tensor:
+        """Fixed vertices, with those of the boundary if the settings say so, and isolated ones."""
+        return self.problem.stays
+
+    def snapshot(self) -> Callable[[], None]:
+        """Puts back what stars are to be."""
+        return self.problem.snapshot()
+
+    def forget(self) -> None:
+        """Searches for closest points begin anew."""
+        self.problem.forget()
+
+    def _fixed(self, fixed: Tensor | None) -> Tensor:
+        count = self.topology.num_vertices
+        mask = self.topology.valences == 0
+        if self.settings.boundary == "fixed":
+            mask = mask | self.topology.is_boundary_vertex
+        if fixed is not None:
+            if fixed.shape != (count,) or fixed.dtype != torch.bool:
+                raise MeshError(f"fixed: expected a bool tensor ({count},), got {tuple(fixed.shape)} {fixed.dtype}")
+            mask = mask | fixed.cpu()
+        return mask
+
+    # ---- what comes of it ------------------------------------------------------------------------------
+
+    def measures(self, vertices: Tensor) -> dict[str, float]:
+        """See :func:`~torchfair.formfinding.symmetric_measures`."""
+        handles = self.pulls.vertices
+        targets = self.unit.invert(self.pulls.targets[handles])
+        return symmetric_measures(vertices, self.principal, self.stars, handles, targets)
+
+    def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
+        """See ``symmetric_promises``."""
+        has_handles = bool(self.pulls.pulled.any())
+        return symmetric_promises(self.settings, before, after, has_handles=has_handles)
+
+    def normals(self, vertices: Tensor) -> Tensor:
+        """(V, 3) unit normals n(v) of vertices (V, 3); see :func:`~torchfair.formfinding.strip_normals`."""
+        return strip_normals(vertices, self.principal, self.stars)
+
+    def level(
+        self, state: State, before: dict[str, float], runs: list[ProjectionResult], like: Tensor
+    ) -> SymmetricLevel:
+        """With principal edges and normals."""
+        level, normals = super().level(state, before, runs, like), self.normals(self.vertices(state))
+        return SymmetricLevel(**vars(level), principal=self.principal, normals=normals)
+
+    def refined(self, state: State) -> SymmetricRecipe:
+        """On the mesh refined by Loop subdivision, with labels, handles and fixed vertices."""
+        return refined(self, self.vertices(state))
 
 
 def principal_symmetric(
@@ -100,13 +178,15 @@ def principal_symmetric(
     levels: int = 0,
     settings: SymmetricSettings | None = None,
     callback: Callback | None = None,
-) -> SymmetricResult:
+) -> JobResult[SymmetricLevel]:
     """Makes a triangle mesh principal-symmetric, close to where it starts and through its handles, and refines it.
 
     At every regular vertex the four neighbours across non-principal edges lie on a sphere through the vertex, along
     principal edges the normals of these spheres and the edge are coplanar, and where the angle sum is above 2 pi the
-    star is saddle-shaped. Nothing is asked of singular and boundary vertices. Conditions are met to rounding where
-    they can be met; the report says how well.
+    star is saddle-shaped. Nothing is asked of singular and boundary vertices. Promises, which are measured on every
+    level (:attr:`~torchfair.formfinding.JobResult.promises`): conditions within ``settings.tolerance``; negatively
+    curved stars saddle-shaped, without pyramids that intersect themselves; handles within 0.05 mean edges of their
+    targets; no face turned over.
 
     Principal edges must run along a principal direction of the surface, and near parabolic curves along that of the
     smaller curvature: stars there cannot be saddle-shaped otherwise.
@@ -122,74 +202,38 @@ def principal_symmetric(
             default all regular ones. With ``settings.energy_weight`` E is lowered everywhere else.
         levels: How often to refine by Loop subdivision; the labels are carried along.
         settings: Weights and tolerances.
-        callback: Called with every iteration record; returning True stops. Ctrl-C returns the best state so far.
+        callback: Called with every iteration record; returning True stops. Ctrl-C, or a function that raises
+            KeyboardInterrupt, returns the best state so far.
+
+    Returns:
+        One level for every mesh from coarse to fine, with its principal edges and normals.
 
     Raises:
         ShapeError: vertices are not ``(V, 3)``, or a handle is not a point.
         MeshError: vertices are not finite, a face has no area, a handle is no vertex or fixed, or no condition can be
             imposed.
+
+    Example::
+
+        result = principal_symmetric(vertices, principal, handles={17: (0.1, 0.0, 0.4)}, levels=1)
+        print(result.vertices, result.levels[-1].principal, result.holds)
     """
 
-    def begin() -> tuple[SymmetricDesign, dict[int, list[float]], dict[str, float]]:
-        pulled, targets = read_handles(handles or {}, principal.topology)
-        design = SymmetricDesign(
-            vertices, principal, handles=pulled.tolist(), fixed=fixed, reference=reference, on=on, settings=settings
+    def begin() -> SymmetricRecipe:
+        return SymmetricRecipe(
+            vertices, principal, handles=handles, fixed=fixed, reference=reference, on=on, settings=settings
         )
-        return design, dict(zip(pulled.tolist(), targets.tolist(), strict=True)), design.measures()
 
-    done: list[SymmetricLevel] = []
-    notes: list[str] = []
-    with deferred_interrupts() as interrupts:
-        design, places, before = interrupts.insist(begin)
-        stopped = interrupts.insist(design.move, places, callback)
-        for level in range(levels + 1):
-            if level:
-                finer = interrupts.attempt(_solved_finer, design, callback)
-                if finer is None:
-                    stopped, runs = True, done[-1].runs
-                    runs[-1] = interrupted(runs[-1])
-                    break
-                design, before, stopped = finer
-            made = interrupts.insist(_level, design, before, vertices)
-            done.append(made)
-            notes += [f"level {level}: {note}" if levels else note for note in _missed(made.after, design.settings)]
-            if stopped:
-                break
-    return SymmetricResult(done, notes, stopped)
+    return solved(begin, vertices, levels=levels, callback=callback)
 
 
-def _solved_finer(
-    design: SymmetricDesign, callback: Callback | None
-) -> tuple[SymmetricDesign, dict[str, float], bool] | None:
-    """The refined design, its measures at the start, and whether it was stopped; None if interrupted at the start."""
-    finer = design.refined()
-    before = finer.measures()
-    stopped = finer.solve(callback)
-    return None if interrupted_at_the_start(finer.runs) else (finer, before, stopped)
-
-
-def _level(design: SymmetricDesign, before: dict[str, float], like: Tensor) -> SymmetricLevel:
-    """The mesh of a design, in the dtype and on the device of ``like``."""
-    vertices, runs = design.vertices.to(like), list(design.runs)
-    return SymmetricLevel(vertices, design.principal, design.normals(), before, design.measures(), runs)
-
-
-def _missed(after: dict[str, float], settings: SymmetricSettings) -> list[str]:
-    """What the mesh of a level does not meet, in words."""
-    notes = []
-    largest = max(after["largest_cospherical"], after["largest_coplanar"])
-    if largest > settings.tolerance:
-        notes.append(f"conditions are met to {largest:.2g} only: fix fewer vertices, pull less, or allow more steps")
-    wrong = round((1.0 - after["saddle_side_share"]) * after["negative_stars"])
-    crossing = int(after["crossing_pyramids_negative"])
-    if wrong or crossing:
-        notes.append(
-            f"{wrong} negatively curved vertices have a principal neighbour on the wrong side and {crossing} a pyramid "
-            "that intersects itself: choose principal edges along the smaller curvature, or a coarser spacing along "
-            "than across them"
+def _chosen(stars: PrincipalStars, on: Tensor | None) -> PrincipalStars:
+    if on is not None:
+        kept = torch.isin(stars.vertices, on.cpu())
+        stars = PrincipalStars(*(part[kept] for part in stars))
+    if not stars.vertices.numel():
+        raise MeshError(
+            "no condition can be imposed: the mesh has no interior vertex of valence 6 with two opposite principal "
+            "edges among the chosen ones. Check the principal edges, or refine the mesh."
         )
-    if after["largest_handle_distance"] > 0.05 * after["mean_edge_length"]:
-        notes.append(
-            f"a handle ends {after['largest_handle_distance']:.3g} from its target: pull less, or free other vertices"
-        )
-    return notes
+    return stars

@@ -1,0 +1,37 @@
+"""What the design of principal-symmetric meshes promises."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ..job.promises import Promise
+from .settings import SymmetricSettings
+
+_HANDLE_REACHED = 0.05  # mean edge lengths
+
+
+def symmetric_promises(
+    settings: SymmetricSettings, before: Mapping[str, float], after: Mapping[str, float], *, has_handles: bool
+) -> list[Promise]:
+    """What is asked of a mesh, and what its measures are, see :func:`~torchfair.formfinding.symmetric_measures`."""
+    largest = max(after["largest_cospherical"], after["largest_coplanar"])
+    wrong = round((1.0 - after["saddle_side_share"]) * after["negative_stars"])
+    crossing = after["crossing_pyramids_negative"]
+    of_lines = "choose principal edges along the smaller curvature, or a coarser spacing along than across them"
+    of_pulls = "pull less, or free other vertices"
+    promises = [
+        Promise(
+            "largest relative residual of the conditions",
+            settings.tolerance,
+            largest,
+            remedy="fix fewer vertices, pull less, or allow more steps",
+        ),
+        Promise("negatively curved vertices with a principal neighbour on the wrong side", 0, wrong, remedy=of_lines),
+        Promise("negatively curved vertices with a pyramid that intersects itself", 0, crossing, remedy=of_lines),
+        Promise("faces turned over against their neighbours", before["flipped_faces"], after["flipped_faces"]),
+    ]
+    if has_handles:
+        away = after["largest_handle_distance"] / after["mean_edge_length"]
+        name = "distance of a handle from its target"
+        promises.append(Promise(name, _HANDLE_REACHED, away, unit="mean edges", remedy=of_pulls))
+    return promises
