@@ -37,16 +37,18 @@ def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Te
         away: (n,) distances of handles from their targets.
 
     Returns:
-        ``total_absolute_curvature``, ``total_frobenius_curvature``, ``normal_variation``, ``angle_variation``,
-        ``total_mean_curvature`` (length), ``area``, ``mean_edge_length``, ``smallest_angle_degrees``,
+        ``total_absolute_curvature``, ``total_frobenius_curvature``, ``normal_variation``,
+        ``energy_over_curvature``, ``angle_variation``, ``total_mean_curvature`` (length), ``area``, ``mean_edge_length``, ``smallest_angle_degrees``,
         ``folded_faces`` that look away from what surrounds them, ``largest_tilt_degrees`` between prescribed normals
         and those at the boundary (:class:`BoundaryNormals`), ``largest_boundary_distance`` and
         ``largest_handle_distance``.
     """
+    energy, curvature = (float(of(vertices, topology)) for of in (normal_variation, total_absolute_curvature))
     return {
-        "total_absolute_curvature": float(total_absolute_curvature(vertices, topology)),
+        "total_absolute_curvature": curvature,
         "total_frobenius_curvature": float(total_frobenius_curvature(vertices, topology)),
-        "normal_variation": float(normal_variation(vertices, topology)),
+        "normal_variation": energy,
+        "energy_over_curvature": energy / curvature if curvature > 0.0 else math.nan,
         "angle_variation": float(angle_variation(vertices, topology)),
         "total_mean_curvature": float(total_mean_curvature(vertices, topology)),
         "area": float(face_areas(vertices, topology).sum()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -82,7 +83,10 @@ class Pulls:
         if not self.everywhere:
             chosen = self.vertices
             return handle_terms(chosen, self.aims[chosen], weight=weight * self.strength)
-        return self.refreshed_terms(weight=weight)
+        if not as_data:
+            return self.refreshed_terms(weight=weight)
+        (term,) = self.refreshed_terms(weight=weight)
+        return [replace(term, data=self._aims_and_roots({"vertices": self.aims}), refresh=None)]
 
     def refreshed_terms(self, *, weight: float) -> list[ElementTerm]:
         """Those of all vertices, which see other handles, aims and strengths by themselves."""
@@ -93,8 +97,7 @@ class Pulls:
                 pulled_offsets,
                 [("vertices", every)],
                 weight=weight,
-                data=self._aims_and_roots({"vertices": self.aims}) if as_data else (),
-                refresh=None if as_data else self._aims_and_roots,
+                refresh=self._aims_and_roots,
                 jacobian=pulled_derivatives,
                 batched=True,
             )
