@@ -37,9 +37,9 @@ def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Te
         away: (n,) distances of handles from their targets.
 
     Returns:
-        ``total_absolute_curvature``, ``total_frobenius_curvature``, ``normal_variation``,
-        ``energy_over_curvature``, ``angle_variation``, ``total_mean_curvature`` (length), ``area``, ``mean_edge_length``, ``smallest_angle_degrees``,
-        ``folded_faces`` that look away from what surrounds them, ``largest_tilt_degrees`` between prescribed normals
+        ``total_absolute_curvature``, ``total_frobenius_curvature``, ``normal_variation``, ``angle_variation``,
+        ``total_mean_curvature`` (length), ``energy_over_curvature``, ``area``, ``mean_edge_length``,
+        ``smallest_angle_degrees``, ``folded_faces`` that look away from what surrounds them, ``largest_tilt_degrees`` between prescribed normals
         and those at the boundary (:class:`BoundaryNormals`), ``largest_boundary_distance`` and
         ``largest_handle_distance``.
     """
