@@ -5,7 +5,8 @@ estimates the noise itself; with ``curved`` it runs a second time. The filters g
 several settings, for every mesh the one that is best against the clean mesh.
 
 Shown are the mean angle between normals of faces and those of the clean mesh, the mean distance of vertices from the
-clean surface, the change of volume, and faces that are flipped against the clean mesh.
+clean surface, the change of volume, and faces that are flipped: seen along normals of the clean mesh, smoothed over two
+rings. (A face that ends on the other side of a right-angled edge has turned by 90 degrees, but is not flipped.)
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.formfinding import DenoiseSettings, denoise
 from torchfair.formfinding.denoise.measures import volume
+from torchfair.formfinding.denoise.neighbourhoods import Neighbourhoods
+from torchfair.formfinding.denoise.unfolding import Sides
 from torchfair.geometry import ReferenceSurface, edge_lengths, face_normals, vertex_normals
 from torchfair.shapes import Paraboloid, Sphere, Surface, irregular_triangles
 
@@ -92,10 +95,11 @@ def against(clean: Mesh, surface: ReferenceSurface, vertices: Tensor) -> dict[st
     start, topology = clean
     turned = angles(clean, vertices)
     edge = float(edge_lengths(start, topology).mean())
+    sides = Sides.of(start, topology, Neighbourhoods.of(topology))
     errors = {
         "degrees": float(turned.mean()),
         "distance": float(surface.closest(vertices).distances.mean()) / edge,
-        "flipped": float((turned >= 90.0).sum()),
+        "flipped": float(sides.flipped(vertices, topology).sum()),
     }
     if not bool(topology.is_boundary_vertex.any()):
         errors["volume"] = volume(vertices, topology) / volume(start, topology) - 1.0

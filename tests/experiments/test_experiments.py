@@ -51,7 +51,7 @@ def test_energy_of_principal_meshes_converges_to_c_and_that_of_others_does_not(r
 
 
 def test_denoising_keeps_edges_where_filters_do_not(run: Run, tmp_path: Path) -> None:
-    report = run("denoise_shapes", "--faces", "1200", "--shapes", "block", "cylinder", "--levels", "0.3",
+    report = run("denoise_shapes", "--faces", "2500", "--shapes", "block", "cylinder", "--levels", "0.3",
                  "--noises", "all", "--repeats", "1")  # fmt: skip
     for row in report["rows"]:
         assert row["denoise"]["degrees"] < 0.6 * min(row["bilateral"]["degrees"], row["taubin"]["degrees"])
