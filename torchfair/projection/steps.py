@@ -13,15 +13,15 @@ from torch import Tensor
 
 from .._threads import threads_for
 from ..errors import SettingsError
+from .candidates import try_candidates
 from .certificate import certified
 from .course import Course, Outcome, Standing
-from .damped_solution import numbers, propose
+from .damped_solution import propose
 from .damping import Damping
 from .evaluate import check_linearised, check_start
 from .inequalities import Inequalities
 from .layout import State
 from .problem import Problem
-from .proposal import Proposal
 from .result import IterationRecord, Status
 from .settings import ProjectionSettings
 from .state import Linearised, ProjectionState
@@ -32,9 +32,6 @@ from .vanishing import vanishing
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
-
-_LONGEST_EXTRAPOLATION = 3.0
-_LARGEST_CORRECTION = 0.75  # of the step, in the norm of the damping (Transtrum and Sethna 2012)
 
 
 def _plain(function: Callable[Concatenate[Problem, _P], _R]) -> Callable[Concatenate[Problem, _P], _R]:
@@ -162,7 +159,7 @@ def step(
         after = replace(state, courses=ended)
         return after, record_of(after, timings=watch.parts)
     trials = Trials(problem, state, proposal, guard, watch)
-    _try(trials, proposal, state)
+    try_candidates(trials, proposal, state)
     best = trials.best()
     linearised, standings = state.linearised, [course.standing for course in state.courses]
     if best is not None:
@@ -224,32 +221,6 @@ def _judged(problem: Problem, state: ProjectionState) -> ProjectionState:
         for course, answer in zip(state.courses, answers, strict=True)
     ]
     return replace(state, courses=tuple(courses))
-
-
-def _try(trials: Trials, proposal: Proposal, state: ProjectionState) -> None:
-    """Offers the step, the step corrected for curvature, and a longer one where it gained more than promised."""
-    change, settings = proposal.change, state.settings
-    trial = trials.offer(change)
-    bent = [gain < settings.least_uncorrected_gain for gain in trials.gains]
-    if trial is not None and any(bent):
-        correction = proposal.correction(trial, change, state.accuracy)
-        weights, layout = proposal.damping, proposal.system.structure.layout
-        sizes = [layout.member_sums(weights * part.square()) for part in (correction, change)]
-        moderate = (sizes[0] <= _LARGEST_CORRECTION**2 * sizes[1]).tolist()
-        if any(map(all, zip(bent, moderate, strict=True))):
-            trials.offer(change + correction, [b and m for b, m in zip(bent, moderate, strict=True)])
-    # A reweighted model lies above the merit: with a gain of 1.5 its curvature is twice too large, and
-    # the best step along the same line is twice as long.
-    factors = [_extrapolation(gain) for gain in trials.gains]
-    longer = [factor > settings.least_extrapolation for factor in factors]
-    if any(longer):
-        spread = proposal.system.structure.layout.member_spread(numbers(factors, change))
-        trials.offer(spread * change, longer, again=True)
-
-
-def _extrapolation(gain: float) -> float:
-    """Length, in steps, at which a parabola is lowest that starts as promised and has the gain seen."""
-    return min(1.0 / (2.0 - gain), _LONGEST_EXTRAPOLATION) if gain < 2.0 else _LONGEST_EXTRAPOLATION
 
 
 def _after(

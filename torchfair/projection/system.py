@@ -220,34 +220,6 @@ class Structure:
         merits = torch.where(torch.isfinite(merits), merits, torch.inf)
         return Evaluation(state, merits, arguments, values, affine)
 
-    def with_members(
-        self, at: Evaluation, flat: Tensor, part: Evaluation, chosen: list[int], rows: list[int]
-    ) -> Evaluation:
-        """An evaluation in which some members have another state.
-
-        Args:
-            at: Of all members.
-            flat: (N,) the new state of all.
-            part: Of these members, or of more.
-            chosen: Their numbers.
-            rows: Their places in ``part``.
-        """
-        members, places, sources = self.layout.members, torch.tensor(chosen), torch.tensor(rows)
-        places, sources = places.to(self.device), sources.to(self.device)
-
-        def mixed(old: Tensor, new: Tensor) -> Tensor:
-            size = old.shape[0] // members
-            result = old.clone()
-            result.view(members, size, *old.shape[1:])[places] = new.view(-1, size, *old.shape[1:])[sources]
-            return result
-
-        arguments = [tuple(map(mixed, *pair)) for pair in zip(at.arguments, part.arguments, strict=True)]
-        values = [mixed(*pair) for pair in zip(at.values, part.values, strict=True)]
-        affine = None
-        if self.affine is not None and at.affine is not None and part.affine is not None:
-            affine = self.affine.with_members(at.affine, part.affine, places, members)
-        return Evaluation(self.layout.unflatten(flat), mixed(at.merits, part.merits), arguments, values, affine)
-
     def unknowns_of_infinite_elements(self, at: Evaluation) -> Tensor:
         """(N,) bool: unknowns of elements whose share of the merit is not finite."""
         bad = []

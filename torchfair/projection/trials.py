@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from .layout import State
+from .mixed_evaluation import with_members
 from .problem import Problem
 from .proposal import Proposal
 from .state import ProjectionState
@@ -102,7 +103,7 @@ class Trials:
             spread = self._problem.layout.member_spread(chosen.to(tried.change.device))
             self._change = torch.where(spread, tried.change, self._change)
             flat = self._start + self._change
-            self._best = self._problem.structure.with_members(self._best, flat, tried.trial, takes, rows)
+            self._best = with_members(self._problem.structure, self._best, flat, tried.trial, takes, rows)
 
     def sizes(self) -> tuple[list[float], list[bool]]:
         """For each member, the largest change of an unknown, and whether the step promises nothing.
