@@ -24,8 +24,8 @@ class FormFollower:
     """Steps in space, with smoothing and fairness as they were where following began.
 
     What surrounds handles is moved along with them first: a step alone would raise a spike, since flat stars want to
-    stay flat. Fairness is as strong as while smoothing is coarse, and no step leads to an angle below one degree or
-    below the smallest there is.
+    stay flat. Fairness is as strong as while smoothing is coarse, and no step leads to angles below one degree or below
+    the smallest there is.
 
     Args:
         problem: Terms and fixed vertices.
@@ -43,13 +43,12 @@ class FormFollower:
         if self._base is None:
             self._base, self._begun = vertices, self._begun + 1
         base, settings = self._base, problem.settings
-        smoothing, fairness = problem.smoothing(base, settings.smoothing), settings.coarse_fairness_weight
-        own = replace(
-            settings.projection, least_extrapolation=math.inf
-        )  # longer steps carry handles past their targets
+        own = replace(settings.projection, least_extrapolation=math.inf)  # longer ones overshoot
         return replace(
             in_space(problem, vertices, settings.smoothing, own),
-            terms=lambda: problem.terms(base, smoothing, fairness),
+            terms=lambda: problem.terms(
+                base, problem.smoothing(base, settings.smoothing), settings.coarse_fairness_weight
+            ),
             version=("live", self._begun, problem.pulls.version),
             guard=self._guard(vertices),
         )
