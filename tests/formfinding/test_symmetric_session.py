@@ -168,6 +168,21 @@ def test_snapshots_bring_everything_back_bit_for_bit(at: str) -> None:
         assert all(torch.equal(*pair) for pair in zip(once, again, strict=True))
 
 
+def test_snapshots_hold_what_stars_are_to_be() -> None:
+    session = opened(rounds=1, most_steps=10)
+    sides = session.recipe.problem.sides
+    sides._preference[5], sides.margin = 8.0, 0.07
+    snapshot = session.snapshot()
+    for _ in range(2):
+        session.move({HANDLE: above(session, 1.0)})
+        session.solve()
+        assert float(sides._preference[5]) == 1.0
+        session.restore(snapshot)
+        assert session.recipe.problem.sides is sides
+        assert (float(sides._preference[5]), sides.margin) == (8.0, 0.07)
+        assert not bool(session.recipe.pulls.pulled.any())
+
+
 def test_refined_sessions_carry_handles_held_and_fixed_vertices() -> None:
     vertices, _ = torus()
     fixed = torch.zeros(len(vertices), dtype=torch.bool)

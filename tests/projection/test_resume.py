@@ -93,3 +93,20 @@ def test_a_state_resumes_with_other_weights_and_from_other_blocks() -> None:
         expected = init(heavier, given or blocks, replace(SETTINGS, initial_damping=state.damping))
         assert found.merit == pytest.approx(expected.merit, rel=1e-12)
         assert torch.equal(found.blocks["points"], (given or blocks)["points"])
+
+
+def test_linear_terms_that_are_the_very_same_are_assembled_once() -> None:
+    """Others are not, and with fixed unknowns both leave them alone."""
+    blocks, (links, drawing) = chain()
+    problem = GuidedProjection(blocks, [links, drawing], fixed=mask(3))
+    problem.prepare()
+    same = problem.with_terms([replace(links, weight=5.0), drawing])
+    other = problem.with_terms([links, replace(drawing, weight=0.4)])
+    assert same.structure.affine is problem.structure.affine
+    assert other.structure.affine is not problem.structure.affine
+    for changed in (same, other):
+        found, expected = (
+            system.structure.linearise(blocks).lower_values
+            for system in (changed, GuidedProjection(blocks, changed.terms, fixed=mask(3)))
+        )
+        torch.testing.assert_close(found, expected, rtol=1e-14, atol=1e-14)
