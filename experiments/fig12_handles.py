@@ -27,7 +27,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.energies import angle_variation, normal_variation
-from torchfair.formfinding import FairResult, FairSettings, minimise_normal_variation
+from torchfair.formfinding import FairSettings, JobResult, Level, minimise_normal_variation
 from torchfair.geometry import dihedral_angles, gauss_image
 from torchfair.viewing import EdgeStyle, MeshView, fit_camera, view_direction
 from torchfair.viewing.shading import shade_faces
@@ -92,7 +92,7 @@ def saddle_handles(vertices: Tensor, topology: Topology, pull: float) -> dict[in
     return handles
 
 
-def pulled(mesh: Mesh, config: Config, energy_weight: float) -> FairResult:
+def pulled(mesh: Mesh, config: Config, energy_weight: float) -> JobResult[Level]:
     """The mesh after the handles have been pulled."""
     settings = FairSettings(
         energy_weight=energy_weight,

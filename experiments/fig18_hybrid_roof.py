@@ -22,7 +22,7 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.cameras import Camera
 from torchfair.constraints.lifted_normal_variation import lifted_blocks
-from torchfair.formfinding import FairResult, FairSettings, minimise_normal_variation
+from torchfair.formfinding import FairSettings, JobResult, Level, minimise_normal_variation
 from torchfair.geometry import edge_lengths
 from torchfair.shapes import hybrid_roof
 from torchfair.viewing import (
@@ -67,7 +67,7 @@ class Config(ExperimentConfig):
 # ---- the job -------------------------------------------------------------------------------------------
 
 
-def run_job(vertices: Tensor, topology: Topology, config: Config, formulation: str) -> tuple[FairResult, Report]:
+def run_job(vertices: Tensor, topology: Topology, config: Config, formulation: str) -> tuple[JobResult[Level], Report]:
     """Lowers E and reports what happened."""
     settings = FairSettings(
         formulation=formulation,
