@@ -50,6 +50,7 @@ def test_energy_of_principal_meshes_converges_to_c_and_that_of_others_does_not(r
     assert load_mesh(tmp_path / "out" / "irregular.obj").topology.is_triangular
 
 
+@pytest.mark.slow
 def test_denoising_keeps_edges_where_filters_do_not(run: Run, tmp_path: Path) -> None:
     report = run("denoise_shapes", "--faces", "2500", "--shapes", "block", "cylinder", "--levels", "0.3",
                  "--noises", "all", "--repeats", "1")  # fmt: skip
@@ -220,6 +221,7 @@ def test_mean_curvature_is_better_where_stars_are_saddles(run: Run) -> None:
     assert others["0.1"]["error"]["all"] > 1.3 * saddles["0.1"]["error"]["all"] > 0.05
 
 
+@pytest.mark.slow
 def test_self_intersecting_pyramids_become_fewer_on_a_rough_saddle(run: Run) -> None:
     row = run("fig12_pyramids", "--builtin", "inner_torus")["meshes"]["inner_torus"]
     assert row["after"]["self_intersecting_pyramids"] < 0.3 * row["before"]["self_intersecting_pyramids"]
@@ -227,6 +229,7 @@ def test_self_intersecting_pyramids_become_fewer_on_a_rough_saddle(run: Run) -> 
     assert row["after"]["normal_variation"] < 0.9 * row["before"]["normal_variation"]
 
 
+@pytest.mark.slow
 def test_saddle_term_removes_bad_saddles_near_the_surface(run: Run) -> None:
     results = run("repair_saddles", "--rows", "10", "--rounds", "2")["results"]
     start, repaired = results["start"], results["saddle term"]
@@ -247,6 +250,7 @@ def test_reflections_rank_principal_meshes_first_and_variation_is_energy(run: Ru
     assert report["cases"] == 6
 
 
+@pytest.mark.slow
 def test_vertices_slide_until_reflections_are_smoother_without_folding(run: Run, tmp_path: Path) -> None:
     options = ("--surfaces", "paraboloid", "--rows", "9", "--steps", "12", "--every", "12", "--rate", "0.03",
                "--size", "64", "--judged-size", "64")  # fmt: skip
