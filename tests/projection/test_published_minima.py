@@ -50,7 +50,15 @@ def test_data_and_formulas_give_the_published_minimum(name: str) -> None:
         return values
 
     found = least_squares(
-        residuals, problem.start.numpy(), jacobian, method="trf", x_scale="jac", max_nfev=5000, xtol=1e-12, ftol=1e-12, gtol=1e-12
+        residuals,
+        problem.start.numpy(),
+        jacobian,
+        method="trf",
+        x_scale="jac",
+        max_nfev=5000,
+        xtol=1e-12,
+        ftol=1e-12,
+        gtol=1e-12,
     )
     assert is_minimum(problem, 2 * found.cost)
 

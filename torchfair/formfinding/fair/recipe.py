@@ -61,7 +61,7 @@ class FairRecipe(Recipe[FairSettings]):
 
     def follower(self, state: State) -> Stage:
         """Everything at once, with the sharp absolute value; longer steps would carry handles past their targets."""
-        settings = replace(self.settings.projection, least_extrapolation=math.inf)
+        settings = replace(self.settings.projection, least_extrapolation=math.inf, least_uncorrected_gain=0.0)
         return self.problem.stage(state, 1.0, 1.0, settings)
 
     def state(self) -> State:
