@@ -15,7 +15,7 @@ FLOORS = (
     {"settings"},
     {"_connectivity", "projection"},
     {"topology"},
-    {"_graph", "boundary", "geometry", "polylines", "repair", "triangulation"},
+    {"_graph", "_one_mesh", "boundary", "geometry", "polylines", "repair", "triangulation"},
     {"curves", "energies", "io", "normalisation", "shapes", "subdivision"},
     {"principal", "reflection", "stars"},
     {"constraints", "measuring", "viewing"},

@@ -255,3 +255,28 @@ def test_wrong_steering_is_refused_by_name() -> None:
         session.weigh(fairness=-1.0)
     with pytest.raises(MeshError, match="does not refine"):
         session.refined()
+
+
+def test_weights_come_and_go() -> None:
+    """Terms without a weight are none; the merit has them again where their weights are back."""
+
+    def kinds(session: Session[FairRecipe]) -> set[str]:
+        (_, problem), *_ = session._problems.values()
+        return {term.name for term in problem.structure.terms}
+
+    session = opened()
+    for weights, there in (({"closeness": 0.0}, False), ({"closeness": 20.0, "fairness": 0.0}, True)):
+        session.weigh(**weights)
+        assert session.step().accepted
+        assert ("closeness" in kinds(session)) is there
+    assert "fairness" not in kinds(session)
+    assert not session.settle()
+
+
+def test_other_handles_between_whole_solves() -> None:
+    """A session that is not live has terms for its handles alone, which are made anew where there are others."""
+    session = Session(FairRecipe(*sheet(), handles={MIDDLE: above(opened(), 0.2)}), live=False)
+    session.solve()
+    session.move({10: above(session, 0.1, 10)})
+    session.solve()
+    assert session.measures()["largest_handle_distance"] < 0.05 * session.recipe.unit.length

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .inputs import add_repair, read_input
 from .job_command import JobCommand
 from .outputs import Request, Writer
+from .pictures import draw_before_after
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
-
-
-def _overview(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
-    from ..viewing import picture_before_after
-
-    picture_before_after(path, request.mesh.vertices, result.vertices, result.topology, overwrite=overwrite)
 
 
 class DenoiseCommand(JobCommand):
@@ -31,7 +25,7 @@ class DenoiseCommand(JobCommand):
         "edges stay sharp. Estimates how much noise there is. Writes the mesh, report.json and a picture of before and "
         "after. Best on bodies of flat and singly curved faces; --curved for organic shapes."
     )
-    pictures: ClassVar[Mapping[str, Writer]] = {"before_after.png": _overview}
+    pictures: ClassVar[Mapping[str, Writer]] = {"before_after.png": draw_before_after}
 
     def settings(self) -> type[Any]:
         """See the base class."""

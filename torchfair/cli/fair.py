@@ -10,15 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from .inputs import add_handles, add_reference, add_repair, read_handles, read_input, read_reference
 from .job_command import JobCommand
 from .outputs import Request, Writer
+from .pictures import draw_before_after
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
-
-
-def _overview(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
-    from ..viewing import picture_before_after
-
-    picture_before_after(path, request.mesh.vertices, result.vertices, result.topology, overwrite=overwrite)
 
 
 def _edges(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
@@ -45,7 +40,7 @@ class FairCommand(JobCommand):
     )
     option_names: ClassVar[Mapping[str, str]] = {"distance_limit": "distance"}
     pictures: ClassVar[Mapping[str, Writer]] = {
-        "before_after.png": _overview,
+        "before_after.png": draw_before_after,
         "edges.png": _edges,
         "gauss_images.png": _gauss_images,
     }

@@ -12,6 +12,7 @@ from .form_inputs import read_form_input
 from .inputs import add_handles, add_levels, add_repair, read_handles
 from .job_command import JobCommand
 from .outputs import Request, Writer
+from .pictures import draw_edges
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
@@ -24,13 +25,6 @@ def _curvature(path: Path, request: Request, result: JobResult[Level], overwrite
     picture_curvature(path, [start, ("result", result.vertices, result.topology)], overwrite=overwrite)
 
 
-def _edges(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
-    from ..viewing import picture_edges
-
-    meshes = {"start": request.mesh.vertices, "result": result.vertices}
-    picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
-
-
 class FormCommand(JobCommand):
     """Lowers C with a given boundary."""
 
@@ -41,7 +35,7 @@ class FormCommand(JobCommand):
         "the smoothest that a polyhedral mesh can approximate. Starts from a mesh, or from one or two boundary curves "
         "alone."
     )
-    pictures: ClassVar[Mapping[str, Writer]] = {"curvature.png": _curvature, "edges.png": _edges}
+    pictures: ClassVar[Mapping[str, Writer]] = {"curvature.png": _curvature, "edges.png": draw_edges}
 
     def settings(self) -> type[Any]:
         """See the base class."""

@@ -11,6 +11,7 @@ from .arguments import count
 from .inputs import add_handles, add_levels, add_reference, read_handles, read_input, read_reference
 from .job_command import JobCommand
 from .outputs import Outputs, Request, Writer
+from .pictures import draw_edges
 from .strips import StripFiles, add_strips
 from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edges, vertex_mask
 
@@ -26,13 +27,6 @@ def _principal(path: Path, request: Request, result: Any, overwrite: bool) -> No
     vertices, edges = request.start
     meshes = {"start": (vertices, edges), "result": (result.vertices, result.levels[-1].principal)}
     picture_principal_edges(path, meshes, overwrite=overwrite)
-
-
-def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
-    from ..viewing import picture_edges
-
-    meshes = {"start": request.mesh.vertices, "result": result.vertices}
-    picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
 
 
 def _labels(path: Path, request: Request, result: Any, overwrite: bool) -> None:
@@ -53,7 +47,7 @@ class SymmetricCommand(JobCommand):
         "stands NAME.edges.json."
     )
     option_names: ClassVar[Mapping[str, str]] = {"most_steps": "steps"}
-    pictures: ClassVar[Mapping[str, Writer]] = {"principal.png": _principal, "edges.png": _edges}
+    pictures: ClassVar[Mapping[str, Writer]] = {"principal.png": _principal, "edges.png": draw_edges}
 
     def settings(self) -> type[Any]:
         """See the base class."""

@@ -9,6 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from .._threads import threads_for
 from ..errors import MeshError, ShapeError, TorchfairError
 from ..stars import (
@@ -22,7 +23,6 @@ from ..stars import (
     pyramid_windings,
 )
 from ..topology import Topology
-from ._one_mesh import one_mesh
 
 MOST_ARCS = 200_000
 """Interior edges up to which crossings in the whole Gauss image are counted."""

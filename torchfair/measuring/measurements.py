@@ -12,9 +12,9 @@ import torch
 from torch import Tensor
 
 from .. import energies, geometry
+from .._one_mesh import one_mesh
 from ..errors import ShapeError
 from ..topology import Topology
-from ._one_mesh import one_mesh
 
 Unit = Literal["length", "area", "1 / length", "degrees", "dimensionless"]
 

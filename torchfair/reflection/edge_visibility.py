@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..cameras.camera import Camera, Size, check_camera, height_and_width
 from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals
@@ -47,10 +48,7 @@ def edge_visibility(
         TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
     """
     check_camera(camera)
-    topology.check_vertices(vertices)
-    if vertices.ndim != 2:
-        raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3), not a batch", tuple(vertices.shape))
-    mesh = vertices.detach().to(torch.float64)
+    mesh = one_mesh(vertices, topology).to(torch.float64)
     if not bool(torch.isfinite(mesh).all()):
         raise TorchfairError("a vertex is not finite: visibility needs positions without NaN and infinity")
     if samples < 1:

@@ -8,7 +8,8 @@ from typing import TypeAlias
 import torch
 from torch import Tensor
 
-from ..errors import ShapeError, TorchfairError
+from .._one_mesh import one_mesh
+from ..errors import TorchfairError
 from ..geometry import vertex_normals
 from ..shapes.principal_quads import parameter_quads
 from ..shapes.surface import Surface
@@ -88,9 +89,7 @@ def one_finite_mesh(vertices: Tensor, topology: Topology) -> Tensor:
         ShapeError: if they are a batch, or do not fit the topology.
         TorchfairError: if one is not finite.
     """
-    topology.check_vertices(vertices)
-    if vertices.ndim != 2:
-        raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3), not a batch", tuple(vertices.shape))
+    vertices = one_mesh(vertices, topology)
     if not bool(torch.isfinite(vertices).all()):
         raise TorchfairError("a vertex is not finite: pictures need positions without NaN and infinity")
-    return vertices.detach()
+    return vertices

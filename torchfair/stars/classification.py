@@ -9,7 +9,7 @@ from enum import IntEnum
 import torch
 from torch import Tensor
 
-from ..errors import ShapeError
+from .._one_mesh import one_mesh
 from ..geometry import angle_defects, vertex_normals
 from ..geometry._ops import dot
 from ..topology import Topology
@@ -132,10 +132,7 @@ def classify_stars(vertices: Tensor, topology: Topology) -> StarClasses:
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (V, 3).
     """
-    topology.check_vertices(vertices)
-    if vertices.ndim != 2:
-        raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3), not a batch", tuple(vertices.shape))
-    vertices = vertices.detach()
+    vertices = one_mesh(vertices, topology)
     classes = _empty(vertices, topology)
     ordinary = vertex_normals(vertices, topology).to(torch.float64)
     for group in star_groups(topology):

@@ -10,7 +10,8 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from ..errors import MeshError, ShapeError
+from .._one_mesh import one_mesh
+from ..errors import MeshError
 from ..geometry import gauss_image
 from ..topology import Topology
 from .pyramid import normal_noise
@@ -60,12 +61,10 @@ def gauss_overlaps(vertices: Tensor, topology: Topology, *, most_pairs: int = MO
         ShapeError: if ``vertices`` is not a floating tensor (V, 3).
         MeshError: if there are more pairs than that. Crumpled meshes have most arcs near each other.
     """
-    topology.check_vertices(vertices)
-    if vertices.ndim != 2:
-        raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3), not a batch", tuple(vertices.shape))
-    image = gauss_image(vertices.detach(), topology)
+    vertices = one_mesh(vertices, topology)
+    image = gauss_image(vertices, topology)
     points: Floats = image.points.cpu().to(torch.float64).numpy()
-    noise: Floats = normal_noise(vertices.detach(), topology).cpu().to(torch.float64).numpy()
+    noise: Floats = normal_noise(vertices, topology).cpu().to(torch.float64).numpy()
     arcs: Ints = image.arcs.cpu().numpy()
     edges: Ints = topology.interior_edges.cpu().numpy()
     inner = ~topology.is_boundary_vertex.cpu().numpy()

@@ -8,10 +8,10 @@ from typing import Any
 
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..energies import normal_variation_per_edge
 from ..errors import TorchfairError
 from ..topology import Topology
-from .render import one_mesh
 
 
 def register_meshes(meshes: Mapping[str, Tensor], topology: Topology) -> Any:

@@ -6,11 +6,12 @@ import os
 
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..reflection import Stripes, face_mirror_directions
 from ..topology import Topology
 from .camera import fit_camera
 from .captions import energy_caption
-from .render import MeshView, one_mesh
+from .render import MeshView
 from .shading import shade_faces, stripe_colors, stripe_frequency
 from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction

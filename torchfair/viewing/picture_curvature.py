@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..energies import total_absolute_curvature_per_vertex
 from ..errors import ShapeError
 from ..geometry import vertex_areas
@@ -15,7 +16,7 @@ from ..topology import Topology
 from .camera import fit_camera
 from .captions import literal
 from .color_scale import BAR, ColorScale
-from .render import MeshView, one_mesh
+from .render import MeshView
 from .shading import shade_faces
 from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..energies import angle_variation_per_edge
 from ..errors import ShapeError
 from ..topology import Topology
@@ -15,7 +16,7 @@ from .camera import fit_camera
 from .captions import energy_caption
 from .color_scale import BAR, ColorScale
 from .lines import EdgeStyle
-from .render import MeshView, one_mesh
+from .render import MeshView
 from .shading import shade_faces
 from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction

@@ -7,10 +7,10 @@ import os
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..geometry import gauss_image
 from ..topology import Topology
 from .picture_gauss_images import viewpoint
-from .render import one_mesh
 from .sheet import CAPTION, MARGIN, Sheet, points
 from .sphere import draw_arcs, draw_points, draw_sphere, fit_sphere_view
 

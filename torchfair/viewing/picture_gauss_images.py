@@ -7,9 +7,9 @@ import os
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..geometry import GaussImage, face_area_vectors, gauss_image
 from ..topology import Topology
-from .render import one_mesh
 from .sheet import CAPTION, GAP, MARGIN, Sheet, points
 from .sphere import draw_arcs, draw_points, draw_sphere, fit_sphere_view
 from .view_direction import view_direction

@@ -6,10 +6,11 @@ import os
 
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..topology import Topology
 from .camera import fit_camera
 from .lines import EdgeStyle
-from .render import MeshView, one_mesh
+from .render import MeshView
 from .shading import shade_faces
 from .sheet import Sheet
 from .view_direction import ViewDirection, view_direction

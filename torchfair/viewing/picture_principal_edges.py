@@ -8,11 +8,12 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..errors import ShapeError
 from ..principal import PrincipalEdges
 from .camera import fit_camera
 from .lines import EdgeStyle
-from .render import MeshView, one_mesh
+from .render import MeshView
 from .shading import FRONT, shade_faces
 from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction

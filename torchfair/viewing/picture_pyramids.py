@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..errors import ShapeError
 from ..stars import StarClasses, StarKind, normal_pyramid
-from .render import one_mesh
 from .sheet import CAPTION, GAP, MARGIN, Sheet, points
 from .sphere import draw_arcs, draw_points, draw_sphere, fit_sphere_view, on_sphere
 

@@ -7,13 +7,14 @@ import os
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..cameras import Camera, Size
 from ..geometry import face_centres
 from ..stars import StarClasses, StarKind
 from ..topology import Topology
 from .camera import fit_camera
 from .lines import EdgeStyle
-from .render import MeshView, one_mesh
+from .render import MeshView
 from .shading import shade_faces
 from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction

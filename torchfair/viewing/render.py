@@ -9,9 +9,9 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
+from .._one_mesh import one_mesh
 from ..cameras import Camera
 from ..cameras.camera import Size, height_and_width
-from ..errors import ShapeError
 from ..rasterisation.rasterise import interpolate, visible_triangles
 from ..topology import Topology
 from ..triangulation import Triangulation, triangulate
@@ -160,15 +160,3 @@ class MeshView:
         cells = samples.view(-1, factor, self.width, factor, 3)
         parts = (cells[:, row, :, column] for row in range(factor) for column in range(factor))
         return functools.reduce(torch.add, parts) / factor**2
-
-
-def one_mesh(vertices: Tensor, topology: Topology) -> Tensor:
-    """Positions ``(V, 3)`` of one mesh, detached.
-
-    Raises:
-        ShapeError: if they are a batch, or do not fit the topology.
-    """
-    topology.check_vertices(vertices)
-    if vertices.ndim != 2:
-        raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3), not a batch", tuple(vertices.shape))
-    return vertices.detach()

@@ -13,13 +13,12 @@ from ...geometry import corner_angles, face_areas, face_normals
 from ...geometry.closest_point import ReferenceSurface
 from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
-from ..job.promises import Promise
+from ..job.promises import Promise, handle_promise
 
 if TYPE_CHECKING:
     from .problem import FairProblem
 
 PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
-_HANDLE_REACHED = 0.05  # mean edge lengths
 
 
 def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: Normalisation) -> dict[str, float]:
@@ -92,11 +91,9 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         remedy = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"
         promises.append(Promise("planarity of kept faces", PLANAR_PROMISE, after["largest_planarity"], remedy=remedy))
     if bool(problem.pulls.pulled.any()):
-        most = _HANDLE_REACHED * before["mean_edge_length"]
+        away, edge = after["largest_handle_distance"], before["mean_edge_length"]
         remedy = "faces would become too small or too thin; allow smaller angles and areas, or pull less"
-        promises.append(
-            Promise("distance of a handle from its target", most, after["largest_handle_distance"], remedy=remedy)
-        )
+        promises.append(handle_promise(away, edge, remedy=remedy))
     return promises
 
 

@@ -100,7 +100,7 @@ class FairProblem:
             terms=lambda: self.terms(share, blur),
             version=(self.pulls.version, share, blur),
             settings=settings,
-            fixed={"vertices": (self.stays() | self.pulls.held)[:, None].expand(-1, 3).contiguous()},
+            fixed={"vertices": self.stays() | self.pulls.held},
             guard=self.admits,
         )
 

@@ -18,10 +18,9 @@ from ...energies import (
 )
 from ...geometry import corner_angles, edge_lengths, face_areas, face_normals, vertex_normals
 from ...topology import Topology
-from ..job.promises import Promise
+from ..job.promises import Promise, handle_promise
 from .settings import FormSettings
 
-_HANDLE_REACHED = 0.05  # mean edge lengths
 _ON_THE_CURVES = 1e-6  # mean edge lengths
 _TANGENT = 1.0  # degrees
 
@@ -93,9 +92,8 @@ def form_promises(
         tilt = after["largest_tilt_degrees"]
         promises.append(Promise("angle to a prescribed tangent plane", _TANGENT, tilt, unit="degrees", remedy=remedy))
     if handles:
-        most, reached = _HANDLE_REACHED * edge, after["largest_handle_distance"]
         remedy = "pull less, or allow more iterations"
-        promises.append(Promise("distance of a handle from its target", most, reached, remedy=remedy))
+        promises.append(handle_promise(after["largest_handle_distance"], edge, remedy=remedy))
     return promises
 
 

@@ -128,16 +128,14 @@ class FormRecipe(Recipe[FormSettings]):
 
     def refined(self, state: State) -> FormRecipe:
         """By Loop or Catmull-Clark subdivision; new boundary vertices are put on the curves, by arc length."""
-        vertices, pulls = self.vertices(state), self.pulls
+        vertices = self.vertices(state)
         track = self.rim.track.updated(vertices) if self.problem.glides else self.rim.track
         scheme = loop if self.topology.is_triangular else catmull_clark
         step = scheme(self.topology, boundary="interpolate", corners=track.corners)
         rim = self.rim._replace(track=track).refined(step)
-        targets = self.unit.invert(pulls.targets[pulls.vertices])
-        handles = dict(zip(pulls.vertices.tolist(), targets.tolist(), strict=True))
         start = rim.track.positions(step.apply(vertices))
-        finer = FormRecipe(start, step.topology, handles=handles, settings=self.settings, rim=rim)
-        finer.pulls.hold(torch.nonzero(pulls.held).squeeze(1))
+        finer = FormRecipe(start, step.topology, handles=self.handles, settings=self.settings, rim=rim)
+        finer.pulls.hold(torch.nonzero(self.pulls.held).squeeze(1))
         return finer
 
     def _on_the_rim(self, vertices: Tensor) -> Tensor:

@@ -34,7 +34,7 @@ def along_normals(
         return base + state["heights"] * directions
 
     return Stage(
-        name=_kind("heights, correct" if correct else "heights", problem.settings),
+        name="heights, correct" if correct else "heights",
         blocks={"heights": base.new_zeros(base.shape[0], 1)},
         terms=lambda: problem.height_terms(
             base, directions, problem.smoothing(base, fraction), fairness_weight, correct=correct
@@ -51,7 +51,7 @@ def along_normals(
 def in_space(problem: FormProblem, vertices: Tensor, fraction: float, settings: ProjectionSettings) -> Stage:
     """A run in which vertices (V, 3) move in all directions, next to prescribed tangent planes along normals only."""
     return Stage(
-        name=_kind("vertices", problem.settings),
+        name="vertices",
         blocks=problem.blocks(vertices),
         terms=lambda: problem.terms(vertices, problem.smoothing(vertices, fraction)),
         version=object(),
@@ -64,12 +64,6 @@ def in_space(problem: FormProblem, vertices: Tensor, fraction: float, settings: 
 
 def _places(state: State) -> Tensor:
     return state["vertices"]
-
-
-def _kind(unknowns: str, settings: FormSettings) -> str:
-    """Name of stages with the same stencils: terms without weight have none."""
-    absent = [name for name, value in vars(settings).items() if name.endswith("_weight") and value == 0.0]
-    return ", ".join([unknowns, *absent])
 
 
 def _along_normals_settings(settings: FormSettings, fraction: float) -> ProjectionSettings:

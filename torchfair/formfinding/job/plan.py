@@ -59,9 +59,14 @@ def at_rest(stage: Stage, damping: float | None) -> Stage:
         damping: Where it goes on.
     """
     settings = replace(stage.settings, merit_tolerance=_REST, patience=1, when_settled="stop")
-    if damping is not None:
-        settings = replace(settings, initial_damping=min(damping, _LARGEST_DAMPING))
-    return replace(stage, settings=settings)
+    return replace(stage, settings=going_on(settings, damping))
+
+
+def going_on(settings: ProjectionSettings, damping: float | None) -> ProjectionSettings:
+    """The settings with the damping of the last live step; as they are if there was none."""
+    if damping is None:
+        return settings
+    return replace(settings, initial_damping=min(damping, _LARGEST_DAMPING))
 
 
 Stages = Generator[Stage, ProjectionResult, None]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+_HANDLE_REACHED = 0.05  # mean edge lengths
+
 
 @dataclass(frozen=True)
 class Promise:
@@ -53,3 +55,15 @@ class Promise:
             "unit": self.unit,
             "holds": self.holds,
         }
+
+
+def handle_promise(away: float, edge: float, *, remedy: str, unit: str = "") -> Promise:
+    """Handles are within a twentieth of a mean edge of their targets.
+
+    Args:
+        away: Largest distance of a handle from its target.
+        edge: Mean edge length in the same unit.
+        remedy: What to change where they are not.
+        unit: Of both, empty for that of the input.
+    """
+    return Promise("distance of a handle from its target", _HANDLE_REACHED * edge, away, unit=unit, remedy=remedy)

@@ -58,15 +58,13 @@ class Recipe(ABC, Generic[S]):
     """
 
     name: ClassVar[str]
-    refuses_degenerate: ClassVar[bool] = True
 
     def __init__(self, vertices: Tensor, topology: Topology, settings: S) -> None:
         given, self.topology = one_start(vertices, topology), topology.to("cpu")
         self.settings = settings
         self.notes: list[str] = []
         self.start_at(given)
-        if self.refuses_degenerate:
-            refuse_degenerate_faces(given, self.topology)
+        refuse_degenerate_faces(given, self.topology)
 
     def start_at(self, vertices: Tensor) -> None:
         """Starts from these places (V, 3) float64, in the unit of the input; before anything is pulled."""
@@ -116,7 +114,7 @@ class Recipe(ABC, Generic[S]):
     @property
     def fixed(self) -> dict[str, Tensor]:
         """Mask of the unknowns of vertices that do not move."""
-        return {"vertices": (self.stays() | self.pulls.held)[:, None].expand(-1, 3).contiguous()}
+        return {"vertices": self.stays() | self.pulls.held}
 
     def take_settings(self, settings: S) -> None:
         """Other weights, of the same kind."""
@@ -136,6 +134,13 @@ class Recipe(ABC, Generic[S]):
         self.check_pulls(vertices, targets)
         self.pulls.pull(vertices, self.unit.apply(targets))
         self.reconsider()
+
+    @property
+    def handles(self) -> dict[int, list[float]]:
+        """Where vertices are pulled, in the unit of the input, by their numbers in order."""
+        vertices = self.pulls.vertices
+        places = self.unit.invert(self.pulls.targets[vertices])
+        return dict(zip(vertices.tolist(), places.tolist(), strict=True))
 
     def reconsider(self) -> None:
         """Called after handles or held vertices have changed, for decisions that depend on them."""

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from ..._interrupts import deferred_interrupts
 from ..._threads import threads_for
-from ...errors import MeshError, SettingsError
+from ...errors import MeshError, SettingsError, ShapeError
 from ...projection import (
     Callback,
     GuidedProjection,
@@ -276,13 +276,19 @@ class Session(Generic[R]):
     # ---- compiled problems -----------------------------------------------------------------------------
 
     def _compiled(self, stage: Stage) -> GuidedProjection:
-        """The problem of a stage, with the index maps and the analysis of the last one of its name."""
+        """The problem of a stage, with the index maps and the analysis of the last one of its name.
+
+        Made anew where terms have come or gone, as with a weight that was zero.
+        """
         version, problem = self._problems.get(stage.name, (None, None))
+        if problem is not None and not stage.anew and version != stage.version:
+            try:
+                problem = problem.with_terms(stage.terms())
+            except ShapeError:  # other stencils; what is wrong with the terms is an error below, too
+                problem = None
         if problem is None or stage.anew:
             problem = GuidedProjection(stage.blocks, stage.terms(), fixed=stage.fixed, solver=stage.settings.solver)
         else:
-            if version != stage.version:
-                problem = problem.with_terms(stage.terms())
             problem = problem.with_fixed(stage.fixed)
         self._problems[stage.name] = (stage.version, problem)
         return problem

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ...projection import ProjectionSettings
 from ...projection.layout import State
-from ..job.plan import Plan, Stages
+from ..job.plan import Plan, Stages, going_on
 from .problem import Aim, SymmetricProblem
 from .score import Score, largest_residual, score
 
@@ -22,7 +22,6 @@ _EXACT = ProjectionSettings(
 )
 _NEAR = replace(_EXACT, initial_damping=1e-6, step_tolerance=3e-11)  # where conditions nearly hold
 _TIGHT_STEPS = 5
-_LARGEST_DAMPING = 0.1  # where live steps were refused
 _PORTION_STEPS = 6
 _LONGEST_PULL = 3.0  # mean edge lengths that handles are pulled at once
 _MOST_PORTIONS = 12
@@ -169,7 +168,4 @@ class SettlingPlan(SymmetricPlan):
             yield from super()._round(first=first)
             return
         self._decide()
-        tight = self._problem.settings.projection
-        if self._damping is not None:
-            tight = replace(tight, initial_damping=min(self._damping, _LARGEST_DAMPING))
-        yield from self._finish(tight, _NEAR)
+        yield from self._finish(going_on(self._problem.settings.projection, self._damping), _NEAR)

@@ -109,19 +109,17 @@ class SymmetricProblem:
     def stage(self, state: State, aim: Aim, settings: ProjectionSettings) -> Stage:
         """A run of guided projection from ``state`` on.
 
-        Shapes that are sought, found and tightened differ in weights alone, and share one analysis. Terms without a
-        weight are left out, so that stages of others are other problems. So are those of the paper's own variables
-        where other stars are to be saddles: slacks belong to these only.
+        Shapes that are sought, found and tightened differ in weights alone, and share one analysis. Those of the
+        paper's own variables are other problems where other stars are to be saddles: slacks belong to these only.
         """
         name = aim.name if aim in (Aim.EXACT, Aim.CONDITIONS) else Aim.SHAPE.name
-        weightless = [name for name, value in vars(self.settings).items() if name.endswith("_weight") and not value]
         return Stage(
-            name=" ".join([name, *weightless]),
+            name=name,
             blocks=state,
             terms=lambda: self.terms(aim),
             version=(aim, self.settings),
             settings=replace(settings, solver=self.settings.projection.solver),
-            fixed={"vertices": (self.stays | self.pulls.held)[:, None].expand(-1, 3).contiguous()},
+            fixed={"vertices": self.stays | self.pulls.held},
             guard=self.admits,
             anew=self.settings.formulation == "lifted",
         )

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..job.promises import Promise
+from ..job.promises import Promise, handle_promise
 from .settings import SymmetricSettings
-
-_HANDLE_REACHED = 0.05  # mean edge lengths
 
 
 def symmetric_promises(
@@ -32,6 +30,5 @@ def symmetric_promises(
     ]
     if has_handles:
         away = after["largest_handle_distance"] / after["mean_edge_length"]
-        name = "distance of a handle from its target"
-        promises.append(Promise(name, _HANDLE_REACHED, away, unit="mean edges", remedy=of_pulls))
+        promises.append(handle_promise(away, 1.0, unit="mean edges", remedy=of_pulls))
     return promises

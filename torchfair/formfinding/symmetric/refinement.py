@@ -38,8 +38,7 @@ def refined(recipe: SymmetricRecipe, vertices: Tensor) -> SymmetricRecipe:
         on=_finer_stars(step, recipe),
         settings=recipe.settings,
     )
-    places = recipe.unit.invert(pulls.targets[pulls.vertices])
-    finer.pull(dict(zip(pulls.vertices.tolist(), places.tolist(), strict=True)))
+    finer.pull(recipe.handles)
     finer.pulls.hold(torch.nonzero(_carried(step, pulls.held, along)).squeeze(1))
     return finer
 

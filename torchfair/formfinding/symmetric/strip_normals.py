@@ -70,6 +70,5 @@ def strip_normals(vertices: Tensor, principal: PrincipalEdges, stars: PrincipalS
             batched=True,
         ),
     ]
-    mask = fixed[:, None].expand(-1, 3).contiguous()
-    found = guided_projection({"normals": start}, terms, fixed={"normals": mask}, settings=_SETTINGS)
+    found = guided_projection({"normals": start}, terms, fixed={"normals": fixed}, settings=_SETTINGS)
     return found.blocks["normals"].to(vertices)

@@ -1,11 +1,11 @@
-"""What is measured is one mesh."""
+"""What takes one mesh, not a batch."""
 
 from __future__ import annotations
 
 from torch import Tensor
 
-from ..errors import ShapeError
-from ..topology import Topology
+from .errors import ShapeError
+from .topology import Topology
 
 
 def one_mesh(vertices: Tensor, topology: Topology) -> Tensor:

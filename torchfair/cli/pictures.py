@@ -1,0 +1,26 @@
+"""Pictures that several job commands draw of what they were given and what came of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .outputs import Request
+
+if TYPE_CHECKING:
+    from ..formfinding import JobResult, Level
+
+
+def draw_before_after(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
+    """Both, shaded and as mirrors; for jobs that keep the topology."""
+    from ..viewing import picture_before_after
+
+    picture_before_after(path, request.mesh.vertices, result.vertices, result.topology, overwrite=overwrite)
+
+
+def draw_edges(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
+    """Edges of both by how much they bend; the result may be a refinement."""
+    from ..viewing import picture_edges
+
+    meshes = {"start": request.mesh.vertices, "result": result.vertices}
+    picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
