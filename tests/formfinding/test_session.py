@@ -280,3 +280,13 @@ def test_other_handles_between_whole_solves() -> None:
     session.move({10: above(session, 0.1, 10)})
     session.solve()
     assert session.measures()["largest_handle_distance"] < 0.05 * session.recipe.unit.length
+
+
+def test_a_session_is_at_rest_as_soon_as_a_step_lowers_the_merit_by_little() -> None:
+    session = opened()
+    drag(session)
+    session.settle()
+    merits = [record.merit for record in session.runs[-1].history if record.accepted]
+    falls = [1.0 - after / before for before, after in zip(merits, merits[1:], strict=False)]
+    assert falls[-1] < 1e-2
+    assert all(fall >= 1e-2 for fall in falls[:-1])
