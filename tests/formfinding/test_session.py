@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import pytest
@@ -287,6 +288,6 @@ def test_a_session_is_at_rest_as_soon_as_a_step_lowers_the_merit_by_little() -> 
     drag(session)
     session.settle()
     merits = [record.merit for record in session.runs[-1].history if record.accepted]
-    falls = [1.0 - after / before for before, after in zip(merits, merits[1:], strict=False)]
+    falls = [1.0 - after / before for before, after in itertools.pairwise(merits)]
     assert falls[-1] < 1e-2
     assert all(fall >= 1e-2 for fall in falls[:-1])
