@@ -14,6 +14,7 @@ from torchfair import MeshError, ShapeError, Topology
 from torchfair.errors import SettingsError
 from torchfair.formfinding import FairRecipe, FairSettings, Session, minimise_normal_variation
 from torchfair.projection import IterationRecord
+from torchfair.shapes import Torus, principal_triangles
 
 MIDDLE = 24  # of the sheet
 
@@ -169,6 +170,65 @@ def test_weights_act_on_the_running_solve() -> None:
         ends = session.vertices[session.recipe.topology.edges]
         spreads.append(float((ends[:, 0] - ends[:, 1]).norm(dim=1).std()))
     assert spreads[1] < spreads[0]
+
+
+@pytest.mark.parametrize("back", ["let go", "pulled back"])
+def test_a_mesh_that_a_handle_has_pulled_off_the_reference_comes_back_to_it(back: str) -> None:
+    session = opened()
+    drag(session, 8)
+    problem = session.recipe.problem
+    assert problem.design_mode
+    if back == "let go":
+        session.free([MIDDLE])
+    else:
+        session.move({MIDDLE: above(session, 0.0)})
+    far = [float(problem.distances(session.state["vertices"]).max())]
+    for _ in range(20):
+        if not session.step().accepted:
+            break
+        far.append(float(problem.distances(session.state["vertices"]).max()))
+    assert not problem.design_mode
+    session.settle()
+    limit = float(problem.limits.max())
+    assert far[0] > 0.5 > limit
+    assert all(after <= max(before, limit) * (1.0 + 1e-6) for before, after in itertools.pairwise(far[1:]))
+    assert float(problem.distances(session.state["vertices"]).max()) <= limit
+
+
+def test_the_way_back_to_the_reference_is_in_snapshots() -> None:
+    session = opened()
+    drag(session, 8)
+    session.free([MIDDLE])
+    session.step()
+    snapshot = session.snapshot()
+    session.step()
+    once = session.vertices
+    drag(session, 3)
+    session.restore(snapshot)
+    session.step()
+    assert torch.equal(session.vertices, once)
+
+
+def test_live_steps_go_on_while_barriers_cut_them_short_of_the_handle() -> None:
+    """On the torus of table 20 the distance limit cuts the second move, which ends just within it."""
+    mesh = principal_triangles(Torus(2.0, 1.0), 12, 40)
+    session = Session(FairRecipe(mesh.vertices, mesh.topology))
+    trials, unit = [], session.recipe.unit.length
+    stride = 0.1 * unit * torch.tensor([0.3, 0.2, 1.0], dtype=DOUBLE) / 1.13**0.5
+    handle = mesh.topology.num_vertices // 5
+    for number in range(1, 5):
+        place = mesh.vertices[handle] + number * stride
+        session.move({handle: place.tolist()})
+        trials.append(session.step().trials)
+        assert float((session.vertices[handle] - place).norm()) < 0.01 * unit
+    assert max(trials) > 1
+
+
+def test_weak_handles_do_not_ask_for_step_after_step() -> None:
+    session = opened()
+    session.weigh(handle=1e-2)
+    session.move({MIDDLE: above(session, 0.1)})
+    assert session.step().trials <= 2
 
 
 @pytest.mark.parametrize("at", ["start", "dragged", "settled"])

@@ -56,9 +56,10 @@ class FairGuard:
             return False
         return bool((corner_angles(after.vertices, self.topology) >= self._smallest_angle).all())
 
-    def keeps_energy(self, trial: State) -> bool:
-        """Whether E does not rise above that of the start."""
-        return self._mesh(trial).energy <= self._start.energy
+    def keeps_energy(self, state: State, trial: State) -> bool:
+        """Whether E does not rise above that of the start, or where handles had raised it, above that of the state."""
+        energy = self._mesh(trial).energy
+        return energy <= self._start.energy or energy <= self._mesh(state).energy
 
     def energy(self, state: State) -> float:
         """E of the mesh of a state."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 
@@ -34,6 +35,7 @@ _PLANARITY_STAGES = 8
 _PLANAR_ENOUGH = 5e-5
 _MOST_STAGES = 20
 _NO_LIMIT = 1e9  # mean edge lengths
+_ROUNDING = 1.0 + 1e-9  # of distances at the start
 
 
 class FairProblem:
@@ -51,6 +53,7 @@ class FairProblem:
         reference_points: (n, 3) its vertices.
         limits: (V,) largest distances from it; None for no limit.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
+        allowed: (V,) the same as they are now: none in design mode, more than ``limits`` on the way back from it.
         design_mode: Whether a handle is pulled off the reference surface, which is then given up.
         planar_faces: (n,) faces that are kept planar.
         boundary: Curves on which boundary vertices glide; None if they do not.
@@ -77,14 +80,37 @@ class FairProblem:
         self.corners = boundary_corners(vertices, topology, settings.corner_angle)
         self.planar_faces = self._planar_faces()
         self.boundary = self._gliding_boundary()
-        self.limits = self._limits()
+        self.limits = self.allowed = self._limits()
 
     def reconsider(self) -> None:
         """Takes in that handles are pulled elsewhere."""
         before, self.design_mode = self.design_mode, self._leaves_reference()
+        if self.design_mode and self.limits is not None:
+            self.allowed = torch.full_like(self.limits, _NO_LIMIT)
         self.has_other_goals = bool(self.pulls.pulled.any()) or self._has_other_reference
         self.pulls.version += before != self.design_mode
         self.__dict__.pop("guard", None)
+
+    def take_up_reference(self, vertices: Tensor) -> None:
+        """Lifts limits to where handles have left the ``vertices`` (V, 3), once these are let go or back on the surface.
+
+        Closeness then brings them back, and none may go farther away.
+        """
+        if self.design_mode or self.limits is None or self.allowed is self.limits:
+            return
+        lifted = torch.maximum(self.limits, self.distances(vertices) * _ROUNDING).minimum(self.allowed)
+        self.allowed = lifted if bool((lifted > self.limits).any()) else self.limits
+        self.pulls.version += 1
+
+    def snapshot(self) -> Callable[[], None]:
+        """A function that puts back what handles have changed."""
+        design_mode, allowed = self.design_mode, self.allowed
+
+        def put_back() -> None:
+            self.design_mode, self.allowed = design_mode, allowed
+            self.__dict__.pop("guard", None)
+
+        return put_back
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""
@@ -156,15 +182,12 @@ class FairProblem:
         if not handles.numel() or limit is None:
             return False
         farthest = float(self.reference.closest(self.pulls.targets[handles]).distances.max())
-        if farthest <= limit:
-            return False
-        if self.design_mode:
-            return True
-        self.notes.append(
-            f"a handle pulls {farthest:.3g} mean edge lengths off the reference surface: closeness and the "
-            "distance limit are switched off (design mode)"
-        )
-        return True
+        if farthest > limit and not self.design_mode:
+            self.notes.append(
+                f"a handle pulls {farthest:.3g} mean edge lengths off the reference surface: closeness and the "
+                "distance limit are switched off (design mode)"
+            )
+        return farthest > limit
 
     def stays(self) -> Tensor:
         """(V,) bool, vertices that do not move: the boundary or its corners, unless they are pulled; isolated ones."""
@@ -210,10 +233,9 @@ class FairProblem:
         if self.pulls.everywhere:
             weights = torch.zeros_like(close) if self.design_mode else close
             term = replace(term, element_weights=weights[chosen].to(self.vertices))
-        if self.limits is None:
+        if self.allowed is None:
             return [term]
-        limits = torch.full_like(self.limits, _NO_LIMIT) if self.design_mode else self.limits
-        return [term, *c.distance_limit_terms(self._surface_or_curve, limits, weight=settings.quality_weight)]
+        return [term, *c.distance_limit_terms(self._surface_or_curve, self.allowed, weight=settings.quality_weight)]
 
     def _limits(self) -> Tensor | None:
         """(V,) largest distances from the reference that are allowed."""
@@ -224,7 +246,7 @@ class FairProblem:
         far = int((distances > limit)[self.topology.valences > 0].sum())
         if far:
             self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")
-        return distances.clamp_min(limit) * (1.0 + 1e-9)  # rounding at the start
+        return distances.clamp_min(limit) * _ROUNDING
 
     def _surface(self, state: State) -> tuple[Tensor, Tensor]:
         """Closest points on the surface and normals there; where it is given up, nothing that costs."""
@@ -286,10 +308,12 @@ class FairProblem:
     def admits(self, state: State, trial: State) -> bool:
         """Whether a step may be taken: no face turns over, bounds hold, and E does not rise above that of the start.
 
-        E may rise where handles, another reference or planarity ask for a different shape.
+        E may rise where handles, another reference or planarity ask for a different shape, and on the way back from
+        where handles have been.
         """
         kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
-        return kept and (self.has_other_goals or self.guard.keeps_energy(trial))
+        rises = self.has_other_goals or self.allowed is not self.limits
+        return kept and (rises or self.guard.keeps_energy(state, trial))
 
     @cached_property
     def guard(self) -> FairGuard:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from torch import Tensor
@@ -55,12 +55,18 @@ class FairRecipe(Recipe[FairSettings]):
         """Where a handle leaves the reference surface, that is given up."""
         self.problem.reconsider()
 
+    def snapshot(self) -> Callable[[], None]:
+        """Puts back whether the reference surface is given up."""
+        return self.problem.snapshot()
+
     def plan(self, state: State) -> FairPlan:
         """Constraints in portions, then the absolute value sharper and sharper."""
+        self.problem.take_up_reference(self.placed(state))
         return FairPlan(self.problem, state)
 
     def follower(self, state: State) -> Stage:
         """Everything at once, with the sharp absolute value; longer steps would carry handles past their targets."""
+        self.problem.take_up_reference(self.placed(state))
         settings = replace(self.settings.projection, least_extrapolation=math.inf, least_uncorrected_gain=0.0)
         return self.problem.stage(state, 1.0, 1.0, settings)
 

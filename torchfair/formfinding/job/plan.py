@@ -49,6 +49,7 @@ class Stage:
 
 _REST = 1e-2  # relative fall of the merit in one step
 _LARGEST_DAMPING = 0.1  # where live steps were refused
+_SMALLEST_DAMPING = 3e-3  # where they were short: what follows goes farther
 
 
 def at_rest(stage: Stage, damping: float | None) -> Stage:
@@ -59,7 +60,7 @@ def at_rest(stage: Stage, damping: float | None) -> Stage:
         damping: Where it goes on.
     """
     settings = replace(stage.settings, merit_tolerance=_REST, patience=1, when_settled="stop")
-    return replace(stage, settings=going_on(settings, damping))
+    return replace(stage, settings=going_on(settings, None if damping is None else max(damping, _SMALLEST_DAMPING)))
 
 
 def going_on(settings: ProjectionSettings, damping: float | None) -> ProjectionSettings:

@@ -78,6 +78,11 @@ class Pulls:
         distances: Tensor = torch.linalg.vector_norm(vertices[chosen] - self.targets[chosen], dim=1)
         return distances
 
+    def lag(self, vertices: Tensor) -> float:
+        """Largest distance of pulled ``vertices`` (V, 3) from their aims."""
+        chosen = self.vertices
+        return float(torch.linalg.vector_norm(vertices[chosen] - self.aims[chosen], dim=1).max()) if len(chosen) else 0.0
+
     def terms(self, *, weight: float, as_data: bool = False) -> list[ElementTerm]:
         """Squared distances from the aims; if they cover all vertices, refreshed, unless asked for as data."""
         if not self.everywhere:

@@ -33,7 +33,10 @@ from .recipe import Recipe
 
 R = TypeVar("R", bound=Recipe[Any])
 
-_MOST_TRIALS = 12  # damped steps that are refused before a live step gives up for now
+_MOST_TRIALS = 12  # damped steps tried in one live step
+_MOST_STEPS = 4  # of them that are accepted, more than one only where handles stay behind
+_LARGEST_LAG = 0.01  # mean edge lengths
+_WORTHWHILE = 0.8  # to which the lag has to fall in a step for another one
 _ENDLESS = 10**9
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one live step
 
@@ -158,7 +161,7 @@ class Session(Generic[R]):
     # ---- live ------------------------------------------------------------------------------------------
 
     def step(self) -> Progress:
-        """One accepted damped step, or the reason why there is none.
+        """One accepted damped step, or more where it was too short for a handle; or the reason why there is none.
 
         Interrupted, or where the callback raises an error, the mesh is as it was.
         """
@@ -166,20 +169,23 @@ class Session(Generic[R]):
         recipe.pulls.aim_near(recipe.placed(self.state), _LONGEST_PULL)
         with torch.no_grad(), threads_for(recipe.start.numel(), recipe.start.device):
             following = self._follow()
-            state, record = following.state, None
-            for trial in range(_MOST_TRIALS + 1):
-                status = finished(state)
-                if status is not None or trial == _MOST_TRIALS:
-                    following.state = state
-                    return Progress(False, _reason(status), record, trial)
+            state, result, record, trials, accepted = following.state, self.state, None, 0, 0
+            lag = recipe.pulls.lag(recipe.placed(result))
+            while trials < _MOST_TRIALS and finished(state) is None:
                 state, record = step(following.problem, state, following.stage.guard)
+                trials, accepted = trials + 1, accepted + record.accepted
                 if record.accepted:
-                    break
-            if self.callback is not None and record is not None:
+                    result = following.stage.result(state.blocks)
+                    before, lag = lag, recipe.pulls.lag(recipe.placed(result))
+                    if accepted == _MOST_STEPS or lag <= _LARGEST_LAG or lag > _WORTHWHILE * before:
+                        break
+            if accepted and self.callback is not None and record is not None:
                 self.callback(record)
-        following.state, self.state = state, following.stage.result(state.blocks)
-        self._moved = bool((recipe.pulls.aims != recipe.pulls.targets).any())
-        return Progress(True, "", record, trial + 1)
+        following.state = state
+        if not accepted:
+            return Progress(False, _reason(finished(state)), record, trials)
+        self.state, self._moved = result, bool((recipe.pulls.aims != recipe.pulls.targets).any())
+        return Progress(True, "", record, trials)
 
     def _follow(self) -> _Following:
         """The compiled problem of live steps and where they stand, with what has changed taken in."""
