@@ -92,11 +92,11 @@ class FairProblem:
         self.__dict__.pop("guard", None)
 
     def take_up_reference(self, vertices: Tensor) -> None:
-        """Lifts limits to where handles have left the ``vertices`` (V, 3), once these are let go or back on the surface.
+        """Lifts limits to where handles have left the ``vertices`` (V, 3), once these are let go or on the surface again.
 
         Closeness then brings them back, and none may go farther away.
         """
-        if self.design_mode or self.limits is None or self.allowed is self.limits:
+        if self.design_mode or self.limits is None or self.allowed is None or self.allowed is self.limits:
             return
         lifted = torch.maximum(self.limits, self.distances(vertices) * _ROUNDING).minimum(self.allowed)
         self.allowed = lifted if bool((lifted > self.limits).any()) else self.limits

@@ -80,8 +80,8 @@ class Pulls:
 
     def lag(self, vertices: Tensor) -> float:
         """Largest distance of pulled ``vertices`` (V, 3) from their aims."""
-        chosen = self.vertices
-        return float(torch.linalg.vector_norm(vertices[chosen] - self.aims[chosen], dim=1).max()) if len(chosen) else 0.0
+        lags = torch.linalg.vector_norm(vertices - self.aims, dim=1)
+        return float(torch.where(self.pulled, lags, 0.0).max())
 
     def terms(self, *, weight: float, as_data: bool = False) -> list[ElementTerm]:
         """Squared distances from the aims; if they cover all vertices, refreshed, unless asked for as data."""
