@@ -92,7 +92,7 @@ class FairProblem:
         self.__dict__.pop("guard", None)
 
     def take_up_reference(self, vertices: Tensor) -> None:
-        """Lifts limits to where handles have left the ``vertices`` (V, 3), once these are let go or on the surface again.
+        """Lifts limits to where handles have left the ``vertices`` (V, 3), once these are let go or on it again.
 
         Closeness then brings them back, and none may go farther away.
         """
