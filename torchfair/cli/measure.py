@@ -41,6 +41,7 @@ _LABELS = {
     "total_absolute_curvature": "C   absolute curvature     sum |k1| + |k2|",
     "total_absolute_curvature_corrected": "C   the same, corrected    by vertex normals",
     "total_frobenius_curvature": "C2  Frobenius curvature    sum sqrt(k1^2 + k2^2)",
+    "willmore_energy": "    Willmore energy        integral of (k1 + k2)^2 / 4",
     "umbrella_fairness": "    umbrella fairness",
     "polyline_fairness": "    polyline fairness",
     "area": "area",

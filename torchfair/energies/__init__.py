@@ -27,3 +27,6 @@ from .total_mean_curvature import total_mean_curvature_per_edge as total_mean_cu
 from .umbrella_fairness import UmbrellaFairness as UmbrellaFairness
 from .umbrella_fairness import umbrella_fairness as umbrella_fairness
 from .umbrella_fairness import umbrella_fairness_per_vertex as umbrella_fairness_per_vertex
+from .willmore_energy import WillmoreEnergy as WillmoreEnergy
+from .willmore_energy import willmore_energy as willmore_energy
+from .willmore_energy import willmore_energy_per_vertex as willmore_energy_per_vertex

@@ -25,6 +25,7 @@ _ENERGIES: dict[str, Unit] = {
     "total_absolute_curvature": "length",
     "total_absolute_curvature_corrected": "length",
     "total_frobenius_curvature": "length",
+    "willmore_energy": "dimensionless",
     "umbrella_fairness": "area",
     "polyline_fairness": "area",
 }
