@@ -11,6 +11,9 @@ from .normal_variation import NormalVariation as NormalVariation
 from .normal_variation import normal_variation as normal_variation
 from .normal_variation import normal_variation_per_edge as normal_variation_per_edge
 from .normal_variation_derivative import normal_variation_derivative as normal_variation_derivative
+from .normal_variation_tangential_gradient import (
+    normal_variation_tangential_gradient as normal_variation_tangential_gradient,
+)
 from .polyline_fairness import PolylineFairness as PolylineFairness
 from .polyline_fairness import polyline_fairness as polyline_fairness
 from .polyline_fairness import polyline_fairness_per_triple as polyline_fairness_per_triple

@@ -30,6 +30,9 @@ from .planarity import planarity as planarity
 from .polylines import second_differences as second_differences
 from .principal_curvatures import principal_directions as principal_directions
 from .principal_curvatures import principal_values as principal_values
+from .reference import Reference as Reference
+from .reference import ReferenceFunction as ReferenceFunction
+from .reference import closest_on as closest_on
 from .shape_operator import shape_operators as shape_operators
 from .spline_curves import SplineCurves as SplineCurves
 from .spline_curves import SplineFeet as SplineFeet
