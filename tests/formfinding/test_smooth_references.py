@@ -53,6 +53,7 @@ def test_a_noisy_sphere_returns_to_the_exact_sphere(scale: float) -> None:
     assert result.after["largest_distance_back"] <= 2.0 * vector_norm(mesh.vertices[0] - mesh.vertices[1]) * scale
 
 
+@pytest.mark.slow
 def test_vertices_slide_on_the_exact_torus_and_lower_the_energy() -> None:
     surface = Torus(2.0, 0.8)
     mesh = irregular_triangles(surface, 120)

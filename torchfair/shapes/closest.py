@@ -18,7 +18,8 @@ _STEPS = 30
 _HALVINGS = 6
 _POLISHES = 2
 _ROWS = 2048  # points compared with all samples at once
-_NEAR = 1e-6  # relative moves at which steps become those of the last digits
+_CLOSE = 1e-4  # moves of parameters after which two steps of Newton's method give the last digits
+_NEAR = 1e-6  # relative moves at which the walk to a level set ends
 _STILL = 1e-15  # and those of Newton's method
 _REACHED = 1e-9  # of the size of things, up to which a point is on a level set
 
@@ -71,7 +72,7 @@ class ClosestOnSurface:
         place = self._nearest_samples(points)
         for _ in range(_STEPS):
             last, place = place, self._nearer(place, points, low, high)
-            if not bool(((place - last).abs() > _NEAR * (high - low).clamp_max(1.0)).any()):
+            if not bool(((place - last).abs() > _CLOSE * (high - low).clamp_max(1.0)).any()):
                 break
         return self._polished(place, points, low, high)
 
