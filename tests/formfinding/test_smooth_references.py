@@ -25,7 +25,6 @@ from torchfair.shapes import (
     principal_triangles,
 )
 
-
 QUICK = replace(FairSettings().projection, max_iterations=20)
 
 

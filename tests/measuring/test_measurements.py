@@ -49,6 +49,7 @@ def test_unit_cube_in_closed_form() -> None:
         "largest_dihedral_angle_degrees": 90,
         "smallest_corner_angle_degrees": 90,
         "largest_planarity": 0,
+        "largest_conical_deviation": 0,
         "angle_defect_sum_degrees": 720,
     }
     measured = values(*cube())

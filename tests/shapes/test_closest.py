@@ -1,4 +1,4 @@
-"""Closest points on smooth surfaces: offsets along normals lead back, boundaries end surfaces, errors name the place."""
+"""Closest points on smooth surfaces: offsets along normals lead back, borders end surfaces, errors name places."""
 
 from __future__ import annotations
 

@@ -52,6 +52,7 @@ _LABELS = {
     "largest_dihedral_angle_degrees": "largest |dihedral angle|",
     "smallest_corner_angle_degrees": "smallest corner angle",
     "largest_planarity": "largest planarity (diagonal distance / mean edge)",
+    "largest_conical_deviation": "farthest from conical (miss / offset distance)",
     "angle_defect_sum_degrees": "sum of angle defects",
     "judged_vertices": "vertices with a complete gradient",
     "largest_tangential_gradient": "largest tangential gradient of E",

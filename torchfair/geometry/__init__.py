@@ -26,6 +26,8 @@ from .normals import adjacent_normals as adjacent_normals
 from .normals import degenerate_faces as degenerate_faces
 from .normals import face_normals as face_normals
 from .normals import vertex_normals as vertex_normals
+from .offsets import conical_deviations as conical_deviations
+from .offsets import offset_directions as offset_directions
 from .planarity import planarity as planarity
 from .polylines import second_differences as second_differences
 from .principal_curvatures import principal_directions as principal_directions
