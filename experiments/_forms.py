@@ -22,9 +22,9 @@ from torchfair import Topology
 from torchfair.constraints import absolute_curvature_terms, tangential_fairness_terms
 from torchfair.constraints.absolute_curvature import closed_star, open_star
 from torchfair.curves import ClosedCurve
-from torchfair.energies import normal_variation, total_absolute_curvature
+from torchfair.energies import normal_variation, total_absolute_curvature, willmore_energy
 from torchfair.formfinding import JobResult, Level, minimise_absolute_curvature
-from torchfair.geometry import corner_angles, face_areas, shape_operators, vertex_areas
+from torchfair.geometry import corner_angles, face_areas
 from torchfair.normalisation import Normalisation
 from torchfair.projection import ElementTerm, ProjectionSettings, SmoothAbsolute, guided_projection
 from torchfair.subdivision import loop
@@ -133,13 +133,13 @@ def developable_hull(curves: Sequence[ClosedCurve], points: int = 720) -> Mesh:
 
 def figures(vertices: Tensor, topology: Topology) -> Report:
     """C by both estimators, and what the other surfaces minimise."""
-    squares = shape_operators(vertices, topology).square().sum((-2, -1)) / vertex_areas(vertices, topology)
     return {
         "total_absolute_curvature": float(total_absolute_curvature(vertices, topology, boundary="extrapolated")),
         "corrected_estimate": float(total_absolute_curvature(vertices, topology, estimator="corrected")),
         "normal_variation": float(normal_variation(vertices, topology)),
         "area": float(face_areas(vertices, topology).sum()),
-        "squared_curvature": float(squares.sum()),
+        "squared_curvature": float(willmore_energy(vertices, topology, density="bending")),
+        "willmore_energy": float(willmore_energy(vertices, topology, boundary="extrapolated")),
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
     }
 

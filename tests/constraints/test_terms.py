@@ -207,8 +207,8 @@ def test_terms_that_see_the_same_state_search_once(monkeypatch: pytest.MonkeyPat
     vertices, topology = wavy_grid()
     planes = TangentPlanes(ReferenceSurface(vertices, topology))
     searched = []
-    closest = planes._tracker.closest
-    monkeypatch.setattr(planes._tracker, "closest", lambda points: (searched.append(points), closest(points))[1])
+    closest = planes._closest
+    monkeypatch.setattr(planes, "_closest", lambda points: (searched.append(points), closest(points))[1])
     limits = torch.ones(topology.num_vertices, dtype=DOUBLE)
     terms = [
         *constraints.closeness_terms(planes, torch.arange(topology.num_vertices), weight=1.0),

@@ -51,6 +51,10 @@ LOSSES: dict[str, list[Make]] = {
     ],
     "TotalMeanCurvature": [energies.TotalMeanCurvature],
     "UmbrellaFairness": [energies.UmbrellaFairness],
+    "WillmoreEnergy": [
+        energies.WillmoreEnergy,
+        lambda t: energies.WillmoreEnergy(t, density="difference", boundary="extrapolated"),
+    ],
 }
 FUNCTIONS: dict[str, Callable[[Tensor, Topology], Tensor]] = {
     "angle_variation": energies.angle_variation,
@@ -64,7 +68,7 @@ FUNCTIONS: dict[str, Callable[[Tensor, Topology], Tensor]] = {
 }
 """Those that make no tables of their own at every call; the topology may keep some after the first."""
 
-TRIANGLES_ONLY = {"TotalAbsoluteCurvature", "TotalFrobeniusCurvature", "ReflectionLoss"}
+TRIANGLES_ONLY = {"TotalAbsoluteCurvature", "TotalFrobeniusCurvature", "WillmoreEnergy", "ReflectionLoss"}
 WAITING = {"ReflectionLoss"}
 """What is seen decides about sizes."""
 

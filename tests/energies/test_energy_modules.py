@@ -67,6 +67,16 @@ ENERGIES = {
         "per_vertex",
         1,
     ),
+    "willmore_energy": Energy(
+        energies.WillmoreEnergy, energies.willmore_energy, energies.willmore_energy_per_vertex, "per_vertex", 0
+    ),
+    "willmore_energy, bending, extrapolated": Energy(
+        partial(energies.WillmoreEnergy, density="bending", boundary="extrapolated"),
+        partial(energies.willmore_energy, density="bending", boundary="extrapolated"),
+        partial(energies.willmore_energy_per_vertex, density="bending", boundary="extrapolated"),
+        "per_vertex",
+        0,
+    ),
 }
 every_energy = pytest.mark.parametrize("energy", ENERGIES.values(), ids=ENERGIES.keys())
 edge_energies = pytest.mark.parametrize("module", [energies.AngleVariation, energies.TotalMeanCurvature])

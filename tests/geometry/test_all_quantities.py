@@ -59,6 +59,8 @@ QUANTITIES = {
     ),
     "star_normals": Quantity(geometry.star_normals, "vertex", 0, rank=1, odd=True),
     "balanced_normals": Quantity(geometry.balanced_normals, "vertex", 0, rank=1, odd=True),
+    "offset_directions": Quantity(geometry.offset_directions, "vertex", 0, rank=1, odd=True),
+    "conical_deviations": Quantity(geometry.conical_deviations, "vertex", 0),
     "vertex_areas": Quantity(geometry.vertex_areas, "vertex", 2),
     "gauss_image": Quantity(lambda vertices, t: geometry.gauss_image(vertices, t).points, "face", 0, rank=1, odd=True),
     "umbrella_vectors": Quantity(geometry.umbrella_vectors, "vertex", 1, rank=1),

@@ -35,6 +35,7 @@ def test_unit_cube_in_closed_form() -> None:
         "total_absolute_curvature": 8,  # eight corners with two eigenvalues 1/2 each in their planes
         "total_absolute_curvature_corrected": 8 * 2 / 3,  # 1/3 is the squared cosine between vertex and face normals
         "total_frobenius_curvature": 4 * math.sqrt(2),
+        "willmore_energy": 8 * 0.5**2 / 0.75,  # mean curvature 1/2 of each corner over an eighth of the area
         "normal_variation_per_area": 2 * math.sqrt(2),
         "angle_variation_per_area": math.pi,
         "total_mean_curvature_per_area": math.pi / 2,
@@ -48,6 +49,7 @@ def test_unit_cube_in_closed_form() -> None:
         "largest_dihedral_angle_degrees": 90,
         "smallest_corner_angle_degrees": 90,
         "largest_planarity": 0,
+        "largest_conical_deviation": 0,
         "angle_defect_sum_degrees": 720,
     }
     measured = values(*cube())

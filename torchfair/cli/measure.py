@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..io.json_text import to_json
 from .arguments import count
-from .inputs import read_input
+from .errors import CommandError
+from .inputs import add_reference, add_repair, read_input, read_reference
 
 if TYPE_CHECKING:
     from ..measuring import EdgeMeasures, Quantity
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 NAME = "torchfair measure"
 _DESCRIPTION = (
     "Prints the energies E and E', curvature, area, lengths and angles of a polygon mesh with their units, and the "
-    "edges that spoil its smoothness most."
+    "edges that spoil its smoothness most; with a reference surface, how far E is from being stationary on it."
 )
 _UNITS = {
     "length": "length units of the file",
@@ -41,6 +42,7 @@ _LABELS = {
     "total_absolute_curvature": "C   absolute curvature     sum |k1| + |k2|",
     "total_absolute_curvature_corrected": "C   the same, corrected    by vertex normals",
     "total_frobenius_curvature": "C2  Frobenius curvature    sum sqrt(k1^2 + k2^2)",
+    "willmore_energy": "    Willmore energy        integral of (k1 + k2)^2 / 4",
     "umbrella_fairness": "    umbrella fairness",
     "polyline_fairness": "    polyline fairness",
     "area": "area",
@@ -50,7 +52,13 @@ _LABELS = {
     "largest_dihedral_angle_degrees": "largest |dihedral angle|",
     "smallest_corner_angle_degrees": "smallest corner angle",
     "largest_planarity": "largest planarity (diagonal distance / mean edge)",
+    "largest_conical_deviation": "farthest from conical (miss / offset distance)",
     "angle_defect_sum_degrees": "sum of angle defects",
+    "judged_vertices": "vertices with a complete gradient",
+    "largest_tangential_gradient": "largest tangential gradient of E",
+    "mean_tangential_gradient": "mean tangential gradient of E",
+    "tangential_imbalance": "imbalance (sum of these / sum of l* around vertices)",
+    "largest_reference_distance": "largest distance from the reference",
 }
 _NAME = 25  # columns of a label before its formula
 
@@ -65,18 +73,28 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of tables")
     parser.add_argument("--worst", type=count, default=10, metavar="N", help="list the N worst edges (default 10)")
+    add_reference(parser, "surface on which vertices may move: measure how far E is from being stationary there")
     parser.add_argument(
-        "--repair", action="store_true", help="orient faces consistently and drop unused vertices first"
+        "--per-vertex", action="store_true", help="with --json and --reference: lists with an entry for every vertex"
     )
+    add_repair(parser)
     parser.set_defaults(run=run, name=NAME)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, measures, prints."""
-    from ..measuring import measure_mesh, worst_edges
+    from ..geometry import ReferenceSurface
+    from ..measuring import measure_mesh, measure_stationarity, worst_edges
 
-    mesh = read_input(arguments.input, arguments.repair)
+    if arguments.per_vertex and not (arguments.json and arguments.reference):
+        raise CommandError("--per-vertex gives lists with --json and --reference only", NAME)
+    mesh, reference = read_input(arguments.input, arguments.repair), read_reference(arguments)
     quantities = measure_mesh(mesh.vertices, mesh.topology)
+    lists = {}
+    if reference is not None:
+        stationarity = measure_stationarity(mesh.vertices, mesh.topology, ReferenceSurface(*reference))
+        quantities += stationarity.quantities()
+        lists = {"per_vertex": stationarity.per_vertex()} if arguments.per_vertex else {}
     worst = worst_edges(mesh.vertices, mesh.topology, arguments.worst)
     if arguments.json:
         entries = {
@@ -84,6 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
             "repairs": list(mesh.repairs),
             "units": {quantity.key: _unit(quantity) for quantity in quantities},
             "worst_edges": worst,
+            **lists,
         }
         sys.stdout.write(to_json({**{quantity.key: quantity.value for quantity in quantities}, **entries}))
     else:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import torch
 from torch import Tensor, nn
 
-from ..geometry.closest_point import ReferenceSurface
+from ..geometry.reference import Reference, closest_on
 from ..projection import ElementTerm
 from ..projection.layout import State
 from ._indexed import IndexedModule
@@ -23,12 +23,13 @@ class TangentPlanes:
     The normal points from the closest point to the vertex where they differ, so that the distance to the
     plane, its gradient and the true distance agree; on the surface it is the interpolated vertex normal.
     Both are constant for derivatives. The last answer is kept for the very tensor that was asked about, since several
-    terms ask for the same state; not for tensors that require gradients, which would keep their graph.
+    terms ask for the same state; not for tensors that require gradients, which would keep their graph. The reference is
+    a mesh, or a function that gives closest points and normals (:func:`torchfair.geometry.closest_on`).
     """
 
-    def __init__(self, reference: ReferenceSurface, block: str = "vertices") -> None:
+    def __init__(self, reference: Reference, block: str = "vertices") -> None:
         self.reference, self.block = reference, block
-        self._tracker = reference.tracker()
+        self._closest = closest_on(reference)
         self._asked: tuple[Tensor, int] | None = None
         self._answer: tuple[Tensor, Tensor] | None = None
 
@@ -39,15 +40,14 @@ class TangentPlanes:
             return self._answer
         asked = None if points.is_inference() or points.requires_grad else (points, points._version)
         points = points.detach()
-        closest = self._tracker.closest(points)
-        away = points - closest.positions
-        distance = closest.distances[:, None]
-        smooth = closest.smooth_normals
+        positions, smooth = self._closest(points)
+        away = points - positions
+        distance: Tensor = torch.linalg.vector_norm(away, dim=1, keepdim=True)
         side = torch.where((away * smooth).sum(1, keepdim=True) < 0.0, -1.0, 1.0).to(points.dtype)
         far = distance > 1e-9
         normals = torch.where(far, side * away / torch.where(far, distance, torch.ones_like(distance)), smooth)
         self._asked = asked
-        self._answer = closest.positions, normals
+        self._answer = positions, normals
         return self._answer
 
     def _is_last(self, points: Tensor) -> bool:
@@ -149,11 +149,12 @@ class Closeness(Constraint):
     The search for closest points runs on the CPU, wherever the vertices are. ``torch.compile`` breaks its graph there.
 
     Args:
-        reference: The surface. It is part of the module and not of its ``state_dict``.
+        reference: The surface, a mesh or a function (:func:`torchfair.geometry.closest_on`). It is part of the module
+            and not of its ``state_dict``.
         vertices: (n,) numbers of the vertices that are to be near it.
     """
 
-    def __init__(self, reference: ReferenceSurface, vertices: Tensor) -> None:
+    def __init__(self, reference: Reference, vertices: Tensor) -> None:
         super().__init__(closeness_terms(TangentPlanes(reference), vertices, weight=1.0))
 
 
@@ -164,9 +165,9 @@ class DistanceLimit(Constraint):
     :class:`Closeness` is.
 
     Args:
-        reference: The surface.
+        reference: The surface, as for :class:`Closeness`.
         limits: (V,) largest distances, above 0; in the state as ``parts.0.refresh.limits``.
     """
 
-    def __init__(self, reference: ReferenceSurface, limits: Tensor) -> None:
+    def __init__(self, reference: Reference, limits: Tensor) -> None:
         super().__init__(distance_limit_terms(TangentPlanes(reference), limits, weight=1.0))

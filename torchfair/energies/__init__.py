@@ -11,6 +11,9 @@ from .normal_variation import NormalVariation as NormalVariation
 from .normal_variation import normal_variation as normal_variation
 from .normal_variation import normal_variation_per_edge as normal_variation_per_edge
 from .normal_variation_derivative import normal_variation_derivative as normal_variation_derivative
+from .normal_variation_tangential_gradient import (
+    normal_variation_tangential_gradient as normal_variation_tangential_gradient,
+)
 from .polyline_fairness import PolylineFairness as PolylineFairness
 from .polyline_fairness import polyline_fairness as polyline_fairness
 from .polyline_fairness import polyline_fairness_per_triple as polyline_fairness_per_triple
@@ -27,3 +30,6 @@ from .total_mean_curvature import total_mean_curvature_per_edge as total_mean_cu
 from .umbrella_fairness import UmbrellaFairness as UmbrellaFairness
 from .umbrella_fairness import umbrella_fairness as umbrella_fairness
 from .umbrella_fairness import umbrella_fairness_per_vertex as umbrella_fairness_per_vertex
+from .willmore_energy import WillmoreEnergy as WillmoreEnergy
+from .willmore_energy import willmore_energy as willmore_energy
+from .willmore_energy import willmore_energy_per_vertex as willmore_energy_per_vertex

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
+import torch
 from torch import Tensor
 
 from ..errors import TorchfairError
@@ -26,8 +27,12 @@ def star_terms(
     sine: bool,
     estimator: Estimator,
     boundary: Boundary | BoundaryExtrapolation,
+    per_area: bool = False,
 ) -> Tensor:
     """``norms`` of the tangential shape operators of all stars (*batch, V), completed at the boundary if asked to.
+
+    With ``per_area`` they are divided by the areas of the stars, as squares of integrated curvatures must be; a star
+    without area contributes nothing.
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
@@ -35,7 +40,12 @@ def star_terms(
     """
     extrapolation = tables_for(boundary, topology)
     values = norms(tangential_shape_operators(vertices, topology, estimator=estimator, sine=sine))
-    return values if extrapolation is None else extrapolation.apply(values, vertex_areas(vertices, topology))
+    if extrapolation is None and not per_area:
+        return values
+    areas = vertex_areas(vertices, topology)
+    if per_area:
+        values = values / torch.where(areas > 0, areas, 1.0)
+    return values if extrapolation is None else extrapolation.apply(values, areas)
 
 
 def tables_for(boundary: Boundary | BoundaryExtrapolation, topology: Topology) -> BoundaryExtrapolation | None:
@@ -50,7 +60,7 @@ def tables_for(boundary: Boundary | BoundaryExtrapolation, topology: Topology) -
 class StarEnergy(MeshModule, ABC):
     """An energy that is a sum over vertex stars of a norm of their shape operators.
 
-    Subclasses define :meth:`norms`.
+    Subclasses define :meth:`norms`, and :attr:`per_area` if these are squares.
 
     Args:
         topology: connectivity of all meshes that the module is called with.
@@ -59,12 +69,14 @@ class StarEnergy(MeshModule, ABC):
         boundary: what to do about incomplete stars.
 
     Attributes:
+        per_area: whether norms are divided by the areas of the stars.
         extrapolation: tables of the boundary, on the device of the topology; None for an open boundary.
 
     Raises:
         TorchfairError: for an unknown estimator or treatment of the boundary.
     """
 
+    per_area: ClassVar[bool] = False
     extrapolation: BoundaryExtrapolation | None
 
     def __init__(
@@ -97,16 +109,21 @@ class StarEnergy(MeshModule, ABC):
         """What is done about incomplete stars."""
         return "open" if self.extrapolation is None else "extrapolated"
 
-    @staticmethod
     @abstractmethod
-    def norms(matrices: Tensor) -> Tensor:
+    def norms(self, matrices: Tensor) -> Tensor:
         """The norm that is summed: symmetric matrices (*batch, V, 2, 2) to (*batch, V)."""
 
     def per_vertex(self, vertices: Tensor) -> Tensor:
         """Terms (*batch, V) of the stars; they sum to ``forward(vertices)``."""
         boundary: Boundary | BoundaryExtrapolation = self.extrapolation or "open"
         return star_terms(
-            self.norms, vertices, self.topology, sine=self.sine, estimator=self.estimator, boundary=boundary
+            self.norms,
+            vertices,
+            self.topology,
+            sine=self.sine,
+            estimator=self.estimator,
+            boundary=boundary,
+            per_area=self.per_area,
         )
 
     def forward(self, vertices: Tensor) -> Tensor:

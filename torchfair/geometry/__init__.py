@@ -26,10 +26,15 @@ from .normals import adjacent_normals as adjacent_normals
 from .normals import degenerate_faces as degenerate_faces
 from .normals import face_normals as face_normals
 from .normals import vertex_normals as vertex_normals
+from .offsets import conical_deviations as conical_deviations
+from .offsets import offset_directions as offset_directions
 from .planarity import planarity as planarity
 from .polylines import second_differences as second_differences
 from .principal_curvatures import principal_directions as principal_directions
 from .principal_curvatures import principal_values as principal_values
+from .reference import Reference as Reference
+from .reference import ReferenceFunction as ReferenceFunction
+from .reference import closest_on as closest_on
 from .shape_operator import shape_operators as shape_operators
 from .spline_curves import SplineCurves as SplineCurves
 from .spline_curves import SplineFeet as SplineFeet

@@ -7,3 +7,5 @@ from .measurements import Quantity as Quantity
 from .measurements import count_components as count_components
 from .measurements import measure_mesh as measure_mesh
 from .measurements import worst_edges as worst_edges
+from .stationarity import Stationarity as Stationarity
+from .stationarity import measure_stationarity as measure_stationarity

@@ -25,6 +25,7 @@ _ENERGIES: dict[str, Unit] = {
     "total_absolute_curvature": "length",
     "total_absolute_curvature_corrected": "length",
     "total_frobenius_curvature": "length",
+    "willmore_energy": "dimensionless",
     "umbrella_fairness": "area",
     "polyline_fairness": "area",
 }
@@ -169,6 +170,7 @@ def _shape(vertices: Tensor, topology: Topology) -> list[Quantity]:
     angles = geometry.dihedral_angles(vertices, topology).abs()
     corners = geometry.corner_angles(vertices, topology)
     deviation = geometry.planarity(vertices, topology)
+    conical = geometry.conical_deviations(vertices, topology)
     total_defect = geometry.angle_defects(vertices, topology).sum()
     any_length, any_angle, any_corner, any_face = (bool(x.numel()) for x in (lengths, angles, corners, deviation))
     rows: tuple[tuple[str, float | None, Unit], ...] = (
@@ -179,6 +181,7 @@ def _shape(vertices: Tensor, topology: Topology) -> list[Quantity]:
         ("largest_dihedral_angle_degrees", math.degrees(float(angles.max())) if any_angle else None, "degrees"),
         ("smallest_corner_angle_degrees", math.degrees(float(corners.min())) if any_corner else None, "degrees"),
         ("largest_planarity", float(deviation.max()) if any_face else None, "dimensionless"),
+        ("largest_conical_deviation", float(conical.max()) if any_face else None, "dimensionless"),
         ("angle_defect_sum_degrees", math.degrees(float(total_defect)), "degrees"),
     )
     return [Quantity(*row, "shape") for row in rows]

@@ -20,3 +20,5 @@ from .strip_files import save_strips_svg as save_strips_svg
 from .strip_limits import StripLimits as StripLimits
 from .strip_limits import strip_limits as strip_limits
 from .strips import developable_strips as developable_strips
+from .support_structure import SupportStructure as SupportStructure
+from .support_structure import support_structure as support_structure

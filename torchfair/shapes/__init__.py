@@ -3,6 +3,9 @@
 from .catalogue import EXAMPLES as EXAMPLES
 from .catalogue import SURFACES as SURFACES
 from .catalogue import builtin_mesh as builtin_mesh
+from .closest import ClosestOnLevelSet as ClosestOnLevelSet
+from .closest import ClosestOnSurface as ClosestOnSurface
+from .closest import closest_on_height_field as closest_on_height_field
 from .height_fields import FreeFormPatch as FreeFormPatch
 from .height_fields import Paraboloid as Paraboloid
 from .height_fields import PrincipalParaboloid as PrincipalParaboloid

@@ -14,14 +14,15 @@ from ... import constraints as c
 from ...boundary import boundary_corners
 from ...constraints.closeness import TangentPlanes
 from ...constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
-from ...geometry import corner_angles, face_areas
-from ...geometry.closest_point import ReferenceSurface
+from ...geometry import closest_on, corner_angles, face_areas, face_centres
 from ...geometry.planarity import planarity
+from ...geometry.reference import Reference
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...topology import Topology
 from ..job.plan import Stage
 from ..job.pulls import Pulls
+from ..references import GivenReference, distances_from, surface_of
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .planar_faces import faces_to_keep_planar
@@ -44,13 +45,14 @@ class FairProblem:
     Args:
         vertices: (V, 3) start, normalised.
         topology: Its connectivity.
-        reference: Surface to stay close to, normalised; by default the start.
+        reference: Surface to stay close to, normalised, a mesh or a function; by default the start.
         pulls: Handles and held vertices.
         settings: Weights and bounds.
 
     Attributes:
         reference: As a surface with closest points.
-        reference_points: (n, 3) its vertices.
+        reference_points: (n, 3) points on it: its vertices; of a function those nearest to the vertices and to the
+            centres of the faces of the start.
         limits: (V,) largest distances from it; None for no limit.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
         allowed: (V,) the same as they are now: none in design mode, more than ``limits`` on the way back from it.
@@ -64,16 +66,13 @@ class FairProblem:
         self,
         vertices: Tensor,
         topology: Topology,
-        reference: tuple[Tensor, Topology] | None,
+        reference: GivenReference | None,
         pulls: Pulls,
         settings: FairSettings,
     ) -> None:
         self.vertices, self.topology, self.pulls, self.settings = vertices, topology, pulls, settings
         self.notes: list[str] = []
-        self.reference = ReferenceSurface(*(reference or (vertices, topology)))
-        self.reference_points = (vertices if reference is None else reference[0])[
-            (topology if reference is None else reference[1]).valences > 0
-        ]
+        self.reference, self.reference_points = self._reference(reference or (vertices, topology))
         self._has_other_reference = reference is not None
         self.forget()
         self.design_mode = self.has_other_goals = False
@@ -177,11 +176,19 @@ class FairProblem:
 
     # ---- decisions -------------------------------------------------------------------------------------
 
+    def _reference(self, reference: GivenReference) -> tuple[Reference, Tensor]:
+        surface = surface_of(reference)
+        if isinstance(reference, tuple):
+            return surface, reference[0][reference[1].valences > 0]
+        used = self.vertices[self.topology.valences > 0]
+        places = torch.cat([used, face_centres(self.vertices, self.topology)])
+        return surface, closest_on(surface)(places)[0]
+
     def _leaves_reference(self) -> bool:
         limit, handles = self.settings.distance_limit, self.pulls.vertices
         if not handles.numel() or limit is None:
             return False
-        farthest = float(self.reference.closest(self.pulls.targets[handles]).distances.max())
+        farthest = float(distances_from(self.reference, self.pulls.targets[handles]).max())
         if farthest > limit and not self.design_mode:
             self.notes.append(
                 f"a handle pulls {farthest:.3g} mean edge lengths off the reference surface: closeness and the "

@@ -11,14 +11,12 @@ from torch import Tensor
 from ...projection import Callback
 from ...projection.layout import State
 from ...topology import Topology
-from ..checks import one_start
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
+from ..references import GivenReference, normalised_reference
 from .measures import fair_measures, fair_promises
 from .plan import FairPlan
 from .problem import FairProblem
 from .settings import FairSettings
-
-Mesh = tuple[Tensor, Topology]
 
 
 class FairRecipe(Recipe[FairSettings]):
@@ -36,12 +34,12 @@ class FairRecipe(Recipe[FairSettings]):
         vertices: Tensor,
         topology: Topology,
         *,
-        reference: Mesh | None = None,
+        reference: GivenReference | None = None,
         handles: Mapping[int, Sequence[float]] | None = None,
         settings: FairSettings | None = None,
     ) -> None:
         super().__init__(vertices, topology, settings or FairSettings())
-        surface = None if reference is None else (self.unit.apply(one_start(*reference)), reference[1].to("cpu"))
+        surface = None if reference is None else normalised_reference(reference, self.unit)
         self.problem = FairProblem(self.start, self.topology, surface, self.pulls, self.settings)
         self.notes = self.problem.notes
         self.pull(handles or {})
@@ -103,7 +101,7 @@ def minimise_normal_variation(
     vertices: Tensor,
     topology: Topology,
     *,
-    reference: Mesh | None = None,
+    reference: GivenReference | None = None,
     handles: Mapping[int, Sequence[float]] | None = None,
     settings: FairSettings | None = None,
     callback: Callback | None = None,
@@ -121,8 +119,9 @@ def minimise_normal_variation(
     Args:
         vertices: (V, 3).
         topology: Connectivity; it does not change.
-        reference: Surface to stay close to, by default the input itself. Vertices that start farther from
-            it than the limit may not go farther away than they are.
+        reference: Surface to stay close to, by default the input itself: vertices and topology of a mesh, or a smooth
+            surface as a function that gives closest points and unit normals (:func:`torchfair.geometry.closest_on`).
+            Vertices that start farther from it than the limit may not go farther away than they are.
         handles: Targets by vertex number. Where a target is farther from the reference surface than the
             limit, the reference is given up (design mode, paper Fig. 12) and a note says so.
         settings: Weights, bounds and tolerances.

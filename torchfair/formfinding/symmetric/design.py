@@ -12,6 +12,7 @@ from ...principal.principal_edges import PrincipalStars
 from ...projection import Callback, ProjectionResult
 from ...topology import Topology
 from ..job import Session
+from ..references import GivenReference
 from .recipe import SymmetricRecipe
 from .settings import SymmetricSettings
 
@@ -27,7 +28,8 @@ class SymmetricDesign:
         principal: Which edges are principal; it holds the topology.
         handles: Vertices that are pulled to where they are, until they are moved; others can be moved later too.
         fixed: (V,) bool, vertices that do not move.
-        reference: Vertices and topology of a surface to stay close to.
+        reference: Surface to stay close to: vertices and topology of a mesh, or a function that gives closest points
+            and unit normals (:func:`torchfair.geometry.closest_on`).
         on: Vertices where conditions are imposed, by default all regular ones.
         settings: Weights and tolerances.
 
@@ -47,7 +49,7 @@ class SymmetricDesign:
         *,
         handles: Sequence[int] = (),
         fixed: Tensor | None = None,
-        reference: tuple[Tensor, Topology] | None = None,
+        reference: GivenReference | None = None,
         on: Tensor | None = None,
         settings: SymmetricSettings | None = None,
     ) -> None:

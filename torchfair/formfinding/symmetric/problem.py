@@ -17,7 +17,7 @@ from ...constraints.lifted_principal_symmetric import lifted_blocks, lifted_prin
 from ...constraints.principal_symmetric import between_stars, sphere_blocks
 from ...constraints.saddle_sides import SaddleSides
 from ...geometry import corner_angles
-from ...geometry.closest_point import ReferenceSurface
+from ...geometry.reference import Reference
 from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
 from ...projection import ElementTerm, ProjectionSettings
@@ -64,7 +64,7 @@ class SymmetricProblem:
         stars: PrincipalStars,
         stays: Tensor,
         pulls: Pulls,
-        reference: ReferenceSurface | None,
+        reference: Reference | None,
         settings: SymmetricSettings,
     ) -> None:
         self.base, self.principal, self.stars, self.settings = base, principal, stars, settings

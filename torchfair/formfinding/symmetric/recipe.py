@@ -10,14 +10,12 @@ import torch
 from torch import Tensor
 
 from ...errors import MeshError
-from ...geometry.closest_point import ReferenceSurface
 from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
-from ...topology import Topology
-from ..checks import one_start
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
+from ..references import GivenReference, normalised_reference, surface_of
 from .measures import symmetric_measures
 from .plan import SettlingPlan, SymmetricPlan
 from .problem import Aim, SymmetricProblem
@@ -50,7 +48,8 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
     Attributes:
         principal: Which edges are principal.
         stars: Where conditions are imposed.
-        reference: Vertices and topology of a surface to stay close to.
+        reference: Surface to stay close to: vertices and topology of a mesh, or a function that gives closest points
+            and unit normals (:func:`torchfair.geometry.closest_on`).
         rounds: How often a shape is looked for at most; None for as often as the settings say.
     """
 
@@ -63,7 +62,7 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
         *,
         handles: Mapping[int, Sequence[float]] | None = None,
         fixed: Tensor | None = None,
-        reference: tuple[Tensor, Topology] | None = None,
+        reference: GivenReference | None = None,
         on: Tensor | None = None,
         settings: SymmetricSettings | None = None,
     ) -> None:
@@ -72,9 +71,7 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
         self.stars = _chosen(self.principal.stars(), on)
         self.reference = reference
         self.rounds: int | None = None
-        surface = None
-        if reference is not None:
-            surface = ReferenceSurface(self.unit.apply(one_start(*reference)), reference[1].to("cpu"))
+        surface = None if reference is None else surface_of(normalised_reference(reference, self.unit))
         self.problem = SymmetricProblem(
             self.start, self.principal, self.stars, self._fixed(fixed), self.pulls, surface, self.settings
         )
@@ -173,7 +170,7 @@ def principal_symmetric(
     *,
     handles: Mapping[int, Sequence[float]] | None = None,
     fixed: Tensor | None = None,
-    reference: tuple[Tensor, Topology] | None = None,
+    reference: GivenReference | None = None,
     on: Tensor | None = None,
     levels: int = 0,
     settings: SymmetricSettings | None = None,
@@ -197,7 +194,8 @@ def principal_symmetric(
         handles: Places by vertex number. They pull their surroundings along; unless the conditions forbid it they
             are reached, but for a hundredth of an edge or so.
         fixed: (V,) bool, vertices that keep their places.
-        reference: Vertices and topology of a surface to stay close to.
+        reference: Surface to stay close to: vertices and topology of a mesh, or a function that gives closest points
+            and unit normals (:func:`torchfair.geometry.closest_on`).
         on: Vertices where conditions are imposed, such as those of some principal polylines (paper Fig. 14h); by
             default all regular ones. With ``settings.energy_weight`` E is lowered everywhere else.
         levels: How often to refine by Loop subdivision; the labels are carried along.
