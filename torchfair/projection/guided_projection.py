@@ -33,7 +33,7 @@ def guided_projection(
     """Lowers the sum of ``terms`` from ``blocks`` on by damped Gauss-Newton steps.
 
     Each step solves ``(J^T J + damping * scale) d = -J^T r`` and is taken only if the merit, the sum of the
-    true losses of all terms, falls. Constraints are terms with large weights, targets terms with small ones
+    true losses of all terms, falls (unless ``settings.step_policy`` says otherwise). Constraints are terms with large weights, targets terms with small ones
     (guided projection after Tang et al. 2014; paper section 5.1).
 
     The solve is not differentiated through: blocks and data that require gradients are detached, silently, and the
@@ -48,10 +48,11 @@ def guided_projection(
             the iteration.
         observe: Named quantities of a state to keep in the history.
         guard: ``guard(state, trial)`` refuses a trial state by returning False; the step then counts as
-            one that does not lower the merit.
+            one that does not lower the merit. Not asked where settings say that every step is taken.
 
     Returns:
-        The best state found. Interrupting (Ctrl-C) returns it too, with ``Status.INTERRUPTED``.
+        The best state found; where every step is taken (``step_policy``), the last one, which may be worse than the
+        start. Interrupting (Ctrl-C) returns it too, with ``Status.INTERRUPTED``.
 
     Raises:
         ShapeError: blocks, terms or masks do not fit together, or a function of a term returns something else
