@@ -33,8 +33,9 @@ def guided_projection(
     """Lowers the sum of ``terms`` from ``blocks`` on by damped Gauss-Newton steps.
 
     Each step solves ``(J^T J + damping * scale) d = -J^T r`` and is taken only if the merit, the sum of the
-    true losses of all terms, falls (unless ``settings.step_policy`` says otherwise). Constraints are terms with large weights, targets terms with small ones
-    (guided projection after Tang et al. 2014; paper section 5.1).
+    true losses of all terms, falls. Constraints are terms with large weights, targets terms with small ones
+    (guided projection after Tang et al. 2014; paper section 5.1). As printed there every step is taken, with constant
+    damping: ``ProjectionSettings(step_policy="every")``.
 
     The solve is not differentiated through: blocks and data that require gradients are detached, silently, and the
     result requires none.

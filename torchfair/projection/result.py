@@ -33,8 +33,8 @@ class Status(enum.Enum):
     INTERRUPTED = "interrupted: the result is the best state found until then"
     CALLBACK = "stopped by the callback: the result is the best state found until then"
     DIVERGED = (
-        "diverged: a step led to residuals that are not finite; the result is the state before it. Every step is taken: "
-        "raise initial_damping, or let steps be judged"
+        "diverged: a step led to residuals that are not finite; the result is the state before it. Where every step is "
+        "taken, raise initial_damping, or let steps be judged"
     )
     SINGULAR = "the linear system stayed singular at the largest damping: check the term named below"
 

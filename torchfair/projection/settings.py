@@ -24,10 +24,10 @@ class ProjectionSettings:
 
     Attributes:
         max_iterations: Bound on the damped steps of a run, rejected ones included.
-        step_policy: ``"judged"`` takes a step only if it lowers the merit, tries better ones, and lets the damping follow
-            what steps gain. ``"every"`` is guided projection as the paper prints it: every step is taken, whatever
-            becomes of the merit and of what guards would say, and the damping stays ``initial_damping``. Nothing holds
-            such a run back; where a step leads to what is not finite it ends, with ``Status.DIVERGED``.
+        step_policy: ``"judged"`` takes a step only if it lowers the merit, tries better ones, and lets the damping
+            follow what steps gain. ``"every"`` is guided projection as the paper prints it: every step is taken,
+            whatever becomes of the merit and of what guards would say, and the damping stays ``initial_damping``.
+            Nothing holds such a run back; where a step leads to what is not finite it ends, with ``Status.DIVERGED``.
         initial_damping: First Levenberg-Marquardt parameter, relative to the damping scale.
         damping_scale: ``"diagonal"`` damps each unknown in proportion to its stiffness (the largest diagonal entry of
             ``J^T J`` met so far, More 1978), which makes the iteration independent of the units of the unknowns;
