@@ -24,11 +24,13 @@ from .fairness import BoundaryFairness as BoundaryFairness
 from .fairness import DisplacementFairness as DisplacementFairness
 from .fairness import EvenFairness as EvenFairness
 from .fairness import InteriorFairness as InteriorFairness
+from .fairness import StraightFairness as StraightFairness
 from .fairness import TangentialFairness as TangentialFairness
 from .fairness import boundary_fairness_terms as boundary_fairness_terms
 from .fairness import displacement_fairness_terms as displacement_fairness_terms
 from .fairness import even_fairness_terms as even_fairness_terms
 from .fairness import interior_fairness_terms as interior_fairness_terms
+from .fairness import polyline_fairness_terms as polyline_fairness_terms
 from .fairness import tangential_fairness_terms as tangential_fairness_terms
 from .flat_edges import FlatEdges as FlatEdges
 from .flat_edges import flat_edge_terms as flat_edge_terms

@@ -132,7 +132,7 @@ class FairProblem:
             *self._energy(blur),
             *self._closeness(),
             *self._boundary(),
-            *c.interior_fairness_terms(self.topology, weight=settings.fairness_weight),
+            *self._fairness(),
             *self._quality(),
             *self.pulls.terms(weight=settings.handle_weight),
             *c.planarity_terms(self.topology, self.planar_faces, weight=planarity_weight),
@@ -249,15 +249,21 @@ class FairProblem:
             return None
         return GlidingBoundary(self.vertices, self.topology, self.corners, self.pulls, self.planar_faces)
 
+    def _fairness(self) -> list[ElementTerm]:
+        weight = self.settings.fairness_weight
+        if self.settings.fairness_kind == "polylines":
+            return c.polyline_fairness_terms(self.topology, weight=weight, corners=self.corners)
+        terms = c.interior_fairness_terms(self.topology, weight=weight)
+        if self.boundary is not None:
+            terms += c.boundary_fairness_terms(self.topology, self.corners, weight=weight)
+        return terms
+
     def _boundary(self) -> list[ElementTerm]:
-        if self.boundary is None:
+        if self.boundary is None or self.boundary.feet is None:
             return []
-        fairness = c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight)
-        if self.boundary.feet is None:
-            return fairness
         gliding = c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight)
         weights = self.boundary.glides.to(self.vertices)
-        return [*(replace(term, element_weights=weights) for term in gliding), *fairness]
+        return [replace(term, element_weights=weights) for term in gliding]
 
     def _quality(self) -> list[ElementTerm]:
         settings = self.settings

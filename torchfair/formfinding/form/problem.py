@@ -16,7 +16,7 @@ from ...geometry import corner_angles, vertex_normals
 from ...geometry.spline_curves import SplineCurves
 from ...linear import Factor, factorise
 from ...normalisation import Normalisation
-from ...projection import ElementTerm
+from ...projection import ElementTerm, LogAbsolute, SmoothAbsolute
 from ...topology import Topology
 from ..job.pulls import Pulls
 from .boundary_track import BoundaryTrack
@@ -125,6 +125,7 @@ class FormProblem:
             smoothing=smoothing,
             weight=settings.curvature_weight,
             constraint_weight=settings.constraint_weight,
+            absolute=LogAbsolute if settings.absolute_value == "logarithmic" else SmoothAbsolute,
         )
         return [*lifted, *others]
 

@@ -13,6 +13,8 @@ from torch import Tensor
 from ... import constraints as c
 from ...constraints.closeness import TangentPlanes
 from ...constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
+from ...constraints.lifted_normal_variation import lifted_blocks as lifted_energy_blocks
+from ...constraints.lifted_normal_variation import lifted_normal_variation_terms
 from ...constraints.lifted_principal_symmetric import lifted_blocks, lifted_principal_symmetric_terms
 from ...constraints.principal_symmetric import between_stars, sphere_blocks
 from ...constraints.saddle_sides import SaddleSides
@@ -103,8 +105,18 @@ class SymmetricProblem:
         if self.settings.formulation == "spheres":
             return {"vertices": vertices, **sphere_blocks(vertices, self.stars)}
         if self.settings.formulation == "lifted":
-            return {"vertices": vertices, **lifted_blocks(vertices, self.edges, self.stars)}
+            return self._with_energy({"vertices": vertices, **lifted_blocks(vertices, self.edges, self.stars)})
         return {"vertices": vertices}
+
+    def _with_energy(self, state: State) -> State:
+        """With the paper's variables of E that fit the vertices, where E is lowered in these."""
+        if not self._lifts_energy:
+            return state
+        return {**state, **lifted_energy_blocks(state["vertices"], self.topology)}
+
+    @property
+    def _lifts_energy(self) -> bool:
+        return self.settings.formulation == "lifted" and self.settings.energy_weight > 0.0
 
     def stage(self, state: State, aim: Aim, settings: ProjectionSettings) -> Stage:
         """A run of guided projection from ``state`` on.
@@ -121,6 +133,7 @@ class SymmetricProblem:
             settings=replace(settings, solver=self.settings.projection.solver),
             fixed={"vertices": self.stays | self.pulls.held},
             guard=self.admits,
+            result=self._with_energy,
             anew=self.settings.formulation == "lifted",
         )
 
@@ -135,7 +148,8 @@ class SymmetricProblem:
             return conditions
         if aim is Aim.EXACT:
             return [*conditions, *self._sides(share=_KEPT_MARGIN)]
-        return [*conditions, *self._sides(ahead=aim is not Aim.SEARCH), *self._same("others", self._others)]
+        others = [*self._energy(weight), *self._same("others", self._others)]
+        return [*conditions, *self._sides(ahead=aim is not Aim.SEARCH), *others]
 
     def _same(self, name: object, make: Callable[[], list[ElementTerm]]) -> list[ElementTerm]:
         """Terms that are the very same for all aims: what is known of them is not found again."""
@@ -152,14 +166,19 @@ class SymmetricProblem:
     def _others(self) -> list[ElementTerm]:
         settings, everywhere = self.settings, torch.arange(self.topology.num_vertices)
         return [
-            *c.displacement_fairness_terms(self.base, self.topology, weight=settings.fairness_weight),
+            *self._fairness(),
             *c.even_star_terms(self.stars, weight=settings.evenness_weight),
             *c.handle_terms(everywhere, self.base, weight=settings.anchor_weight, name="anchors"),
             *self.pulls.refreshed_terms(weight=settings.handle_weight),
             *self._closeness(),
-            *self._energy(),
             *self._quality(),
         ]
+
+    def _fairness(self) -> list[ElementTerm]:
+        weight = self.settings.fairness_weight
+        if self.settings.fairness_kind == "polylines":
+            return c.polyline_fairness_terms(self.topology, weight=weight)
+        return c.displacement_fairness_terms(self.base, self.topology, weight=weight)
 
     def _conditions(self, weight: float) -> list[ElementTerm]:
         if self.settings.formulation == "eliminated":
@@ -177,10 +196,15 @@ class SymmetricProblem:
         every = torch.arange(self.topology.num_vertices)
         return c.closeness_terms(self._planes, every, weight=self.settings.closeness_weight)
 
-    def _energy(self) -> list[ElementTerm]:
+    def _energy(self, constraint_weight: float) -> list[ElementTerm]:
         settings = self.settings
         if not settings.energy_weight:
             return []
+        if self._lifts_energy:
+            planar = torch.ones(self.topology.num_faces, dtype=torch.bool)
+            return lifted_normal_variation_terms(
+                self.base, self.topology, planar, weight=settings.energy_weight, constraint_weight=constraint_weight
+            )
         return c.normal_variation_terms(
             self.topology, smoothing=settings.energy_smoothing, weight=settings.energy_weight
         )
