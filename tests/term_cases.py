@@ -103,6 +103,7 @@ case("even_star_terms", lattice)(lambda v, t, edges, stars: c.even_star_terms(st
 case("face_area_terms", triangles, mixed)(lambda v, t: c.face_area_terms(t, 2.5 * face_areas(v, t), weight=0.5))
 case("interior_fairness_terms", triangles, mixed)(lambda v, t: c.interior_fairness_terms(t, weight=0.5))
 case("normal_variation_terms", triangles, mixed)(lambda v, t: c.normal_variation_terms(t, smoothing=0.1))
+case("polyline_fairness_terms", triangles, mixed)(lambda v, t: c.polyline_fairness_terms(t, weight=0.5))
 case("pyramid_terms", triangles, mixed)(lambda v, t: c.pyramid_terms(t, weight=0.5))
 
 

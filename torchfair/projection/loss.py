@@ -106,7 +106,8 @@ class LogAbsolute:
 
     def root(self, residuals: Tensor) -> Tensor:
         """``(|r| + epsilon)^(-1/2)``."""
-        return torch.rsqrt(torch.linalg.vector_norm(residuals, dim=1) + self.epsilon)
+        sizes: Tensor = torch.linalg.vector_norm(residuals, dim=1)
+        return torch.rsqrt(sizes + self.epsilon)
 
 
 @dataclass(frozen=True)

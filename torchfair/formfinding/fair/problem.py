@@ -251,7 +251,7 @@ class FairProblem:
 
     def _fairness(self) -> list[ElementTerm]:
         weight = self.settings.fairness_weight
-        if self.settings.fairness_kind == "polylines":
+        if self.settings.second_differences:
             return c.polyline_fairness_terms(self.topology, weight=weight, corners=self.corners)
         terms = c.interior_fairness_terms(self.topology, weight=weight)
         if self.boundary is not None:

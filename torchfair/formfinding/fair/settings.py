@@ -17,7 +17,6 @@ from ..printed import printed_projection
 Boundary = Literal["glide", "fixed", "free"]
 Planar = Literal["keep", "quads", "none"]
 Formulation = Literal["reduced", "lifted"]
-FairnessKind = Literal["umbrellas", "polylines"]
 
 
 def _default_projection() -> ProjectionSettings:
@@ -42,8 +41,8 @@ class FairSettings:
         distance_limit: No vertex goes farther from the reference surface than this, or on a boundary that glides
             from its curve, which bulges over the chords; None for no limit.
         fairness_weight: Weight of squared second differences and umbrella vectors.
-        fairness_kind: ``"umbrellas"``, with second differences between quads; or ``"polylines"`` for second differences
-            along all mesh polylines, the paper's.
+        second_differences: Whether fairness is that of second differences along all mesh polylines, the paper's, on
+            triangle meshes too.
         handle_weight: Weight of the squared distance of handles from their targets.
         boundary: ``"glide"`` lets boundary vertices slide on smooth curves through all of them and keeps corners,
             where curves end; ``"fixed"`` keeps them where they are, ``"free"`` leaves them to closeness alone. Between
@@ -70,7 +69,7 @@ class FairSettings:
     closeness_weight: float = 100.0
     distance_limit: float | None = setting(0.05, unit="mean edges")
     fairness_weight: float = 0.3
-    fairness_kind: FairnessKind = "umbrellas"
+    second_differences: bool = False
     handle_weight: float = 1e4
     boundary: Boundary = "glide"
     boundary_weight: float = 1e4
@@ -119,7 +118,7 @@ class FairSettings:
             closeness_weight=w_prox,
             distance_limit=None,
             fairness_weight=4.0 * w_fair,
-            fairness_kind="polylines",
+            second_differences=True,
             handle_weight=w_handle,
             boundary_weight=w_prox,
             planarity_weight=0.0,
@@ -133,7 +132,6 @@ class FairSettings:
     def __post_init__(self) -> None:
         check_choice(self, "boundary", get_args(Boundary))
         check_choice(self, "formulation", get_args(Formulation))
-        check_choice(self, "fairness_kind", get_args(FairnessKind))
         check_weights(self)
         if isinstance(self.planar, str) and self.planar not in get_args(Planar):
             raise SettingsError(

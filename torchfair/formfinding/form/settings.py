@@ -56,8 +56,9 @@ class FormSettings:
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables
             too (for comparison: slower).
         constraint_weight: Weight of the constraints that define auxiliary variables.
-        absolute_value: ``"smooth"``, which is reweighted by the inverse of ``sqrt(x^2 + smoothing^2)``; for the lifted
-            formulation also ``"logarithmic"``, by that of ``|x| + smoothing``, as the paper prints it.
+        absolute_value: Of curvatures that are unknowns, those of the lifted formulation: ``"smooth"`` is reweighted by
+            the inverse of ``sqrt(x^2 + smoothing^2)``, ``"logarithmic"`` by that of ``|x| + smoothing``, as the paper
+            prints it.
         projection: Iterations of each stage, tolerances, damping and linear solver. The tolerance of the merit is
             that of stages in space; along normals ten times it while smoothing is coarse, a tenth of it at last.
     """
@@ -125,8 +126,6 @@ class FormSettings:
         check_choice(self, "boundary", get_args(Boundary))
         check_choice(self, "formulation", get_args(Formulation))
         check_choice(self, "absolute_value", get_args(AbsoluteValue))
-        if self.absolute_value == "logarithmic" and self.formulation == "reduced":
-            raise SettingsError("absolute_value 'logarithmic' is for formulation 'lifted', of numbers, not of matrices")
         check_weights(self)
         if not 0.0 < self.smoothing <= self.coarse_smoothing < math.inf:
             raise SettingsError(

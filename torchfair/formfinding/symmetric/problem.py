@@ -176,7 +176,7 @@ class SymmetricProblem:
 
     def _fairness(self) -> list[ElementTerm]:
         weight = self.settings.fairness_weight
-        if self.settings.fairness_kind == "polylines":
+        if self.settings.second_differences:
             return c.polyline_fairness_terms(self.topology, weight=weight)
         return c.displacement_fairness_terms(self.base, self.topology, weight=weight)
 

@@ -14,7 +14,6 @@ from ..printed import printed_projection
 
 Boundary = Literal["free", "fixed"]
 Formulation = Literal["spheres", "eliminated", "lifted"]
-FairnessKind = Literal["displacement", "polylines"]
 
 
 def _default_projection() -> ProjectionSettings:
@@ -38,8 +37,8 @@ class SymmetricSettings:
         tight_weight: Their weight once it is found; at last they are met exactly, without any other aim.
         fairness_weight: Weight of squared umbrella vectors of the displacement from the start of the level: handles
             pull their surroundings along.
-        fairness_kind: ``"displacement"``; or ``"polylines"`` for plain second differences along all mesh polylines, the
-            paper's, which shrink and straighten shapes.
+        second_differences: Whether fairness is that of plain second differences along all mesh polylines, the paper's,
+            which shrink and straighten shapes; not of the displacement.
         evenness_weight: Weight of stars being symmetric along their principal polyline, which undoes shear; 3 for
             principal quads cut by diagonals.
         anchor_weight: Weight of the squared displacement itself: how far around a handle the mesh follows, about the
@@ -65,7 +64,7 @@ class SymmetricSettings:
     constraint_weight: float = 1e2
     tight_weight: float = 1e4
     fairness_weight: float = 1.0
-    fairness_kind: FairnessKind = "displacement"
+    second_differences: bool = False
     evenness_weight: float = 0.0
     anchor_weight: float = 1e-5
     handle_weight: float = 1e2
@@ -111,7 +110,7 @@ class SymmetricSettings:
         return cls(
             constraint_weight=1.0,
             fairness_weight=4.0 * w_fair,
-            fairness_kind="polylines",
+            second_differences=True,
             anchor_weight=0.0,
             handle_weight=w_handle,
             closeness_weight=w_prox,
@@ -126,7 +125,6 @@ class SymmetricSettings:
     def __post_init__(self) -> None:
         check_choice(self, "boundary", get_args(Boundary))
         check_choice(self, "formulation", get_args(Formulation))
-        check_choice(self, "fairness_kind", get_args(FairnessKind))
         check_weights(self)
         for name in ("constraint_weight", "tight_weight"):
             check_number(name, getattr(self, name), above=True)
