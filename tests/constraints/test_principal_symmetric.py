@@ -20,8 +20,8 @@ from torchfair.constraints.eliminated_principal_symmetric import eliminated_prin
 from torchfair.constraints.lifted_principal_symmetric import lifted_blocks, lifted_principal_symmetric_terms
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.projection import ElementTerm, GuidedProjection, ProjectionSettings
+from torchfair.projection.differentiation import differentiate
 from torchfair.projection.layout import State
-from torchfair.projection.term import differentiate
 from torchfair.shapes import Catenoid, Cylinder, Enneper, Paraboloid, ShapeMesh, Torus, principal_triangles
 from torchfair.shapes.principal_triangles import parameter_triangles
 

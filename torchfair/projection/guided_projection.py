@@ -11,6 +11,7 @@ from .._shown import shown
 from .._threads import threads_for
 from ..errors import ShapeError
 from .batch import BatchRun
+from .differentiation import Way
 from .layout import State
 from .problem import Problem
 from .result import ProjectionResult
@@ -26,6 +27,7 @@ def guided_projection(
     *,
     fixed: Mapping[str, Tensor] | None = None,
     settings: ProjectionSettings | None = None,
+    derivatives: Way | None = None,
     callback: Callback | None = None,
     observe: Observe | None = None,
     guard: Guard | None = None,
@@ -45,6 +47,7 @@ def guided_projection(
         terms: What is to be small. See :class:`ElementTerm`.
         fixed: Masks ``(n,)`` or ``(n, d)`` by block name, True where an unknown stays as it is.
         settings: Tolerances, damping, linear solver.
+        derivatives: How all residuals are differentiated, by default what each term says; see :class:`ElementTerm`.
         callback: Called with every :class:`IterationRecord`, which then also holds the state; returning True stops
             the iteration.
         observe: Named quantities of a state to keep in the history.
@@ -64,7 +67,7 @@ def guided_projection(
             linear term is not linear.
     """
     settings = ProjectionSettings.given(settings)
-    problem = GuidedProjection(blocks, terms, fixed=fixed, solver=settings.solver)
+    problem = GuidedProjection(blocks, terms, fixed=fixed, solver=settings.solver, derivatives=derivatives)
     return problem.solve(blocks, settings=settings, callback=callback, observe=observe, guard=guard)
 
 
@@ -73,7 +76,7 @@ class GuidedProjection(Problem):
 
     Args:
         blocks: Example blocks ``(n, d)``; only sizes, dtype and device matter.
-        terms, fixed: See :func:`guided_projection`.
+        terms, fixed, derivatives: See :func:`guided_projection`.
         solver: Name of a linear solver, or an object with that protocol.
     """
 
