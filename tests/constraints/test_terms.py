@@ -12,7 +12,7 @@ from torch import Tensor
 from torchfair import Topology, constraints
 from torchfair.boundary import boundary_corners, boundary_pieces
 from torchfair.constraints.closeness import TangentPlanes
-from torchfair.constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
+from torchfair.constraints.lifted_normal_variation import lifted_normal_variation_blocks, lifted_normal_variation_terms
 from torchfair.constraints.normal_variation import edge_stencils
 from torchfair.energies import normal_variation
 from torchfair.geometry import corner_angles, dihedral_angles, dual_edge_lengths, edge_lengths, face_areas
@@ -262,7 +262,7 @@ def test_boundary_pieces_and_gliding_need_no_boundary() -> None:
 def test_lifted_variables_satisfy_their_constraints_and_carry_the_energy(name: str) -> None:
     vertices, topology = MESHES[name]()
     planar = topology.face_sizes == 3 if name != "cube" else torch.ones(topology.num_faces, dtype=torch.bool)
-    state = {"vertices": vertices, **lifted_blocks(vertices, topology)}
+    state = {"vertices": vertices, **lifted_normal_variation_blocks(vertices, topology)}
     terms = lifted_normal_variation_terms(vertices, topology, planar, weight=1.0, constraint_weight=10.0)
     for term in terms[:-1]:
         assert term.weight == 10.0

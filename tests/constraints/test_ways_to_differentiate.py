@@ -20,11 +20,13 @@ CPU = torch.device("cpu")
 AUTOMATIC: tuple[AutomaticWay, ...] = get_args(AutomaticWay)
 
 
-@pytest.mark.parametrize("way", AUTOMATIC)
+@pytest.mark.parametrize("way", get_args(Way))
 @pytest.mark.parametrize("name", CASES)
-def test_all_ways_agree_with_the_default_for_every_term(name: str, way: AutomaticWay) -> None:
+def test_all_ways_agree_with_the_default_for_every_term(name: str, way: Way) -> None:
     for state, terms in CASES[name](CPU):
         for term in terms:
+            if way == "closed form" and term.jacobian is None:
+                continue
             term.arguments({key: 0.99 * block for key, block in state.items()})  # some remember the state before
             arguments = term.arguments(state)
             values, expected = term.linearised(arguments)

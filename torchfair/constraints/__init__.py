@@ -39,6 +39,12 @@ from .gliding import Gliding as Gliding
 from .gliding import gliding_terms as gliding_terms
 from .handles import Handles as Handles
 from .handles import handle_terms as handle_terms
+from .lifted_absolute_curvature import lifted_absolute_curvature_blocks as lifted_absolute_curvature_blocks
+from .lifted_absolute_curvature import lifted_absolute_curvature_terms as lifted_absolute_curvature_terms
+from .lifted_normal_variation import lifted_normal_variation_blocks as lifted_normal_variation_blocks
+from .lifted_normal_variation import lifted_normal_variation_terms as lifted_normal_variation_terms
+from .lifted_principal_symmetric import lifted_principal_symmetric_blocks as lifted_principal_symmetric_blocks
+from .lifted_principal_symmetric import lifted_principal_symmetric_terms as lifted_principal_symmetric_terms
 from .normal_variation import SmoothNormalVariation as SmoothNormalVariation
 from .normal_variation import normal_variation_terms as normal_variation_terms
 from .planarity import Planarity as Planarity

@@ -101,7 +101,7 @@ class LogAbsolute:
 
     def value(self, residuals: Tensor) -> Tensor:
         """``|r| - epsilon log(1 + |r| / epsilon)``, never below zero."""
-        sizes = torch.linalg.vector_norm(residuals, dim=1)
+        sizes: Tensor = torch.linalg.vector_norm(residuals, dim=1)
         return (sizes - self.epsilon * torch.log1p(sizes / self.epsilon)).clamp_min(0.0)
 
     def root(self, residuals: Tensor) -> Tensor:

@@ -11,8 +11,6 @@ from torch import Tensor
 
 from ... import constraints as c
 from ...boundary import boundary_corners
-from ...constraints.closeness import TangentPlanes
-from ...constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
 from ...geometry import corner_angles, face_areas
 from ...geometry.closest_point import ReferenceSurface
 from ...geometry.planarity import planarity
@@ -88,7 +86,7 @@ class FairProblem:
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""
-        self._planes = TangentPlanes(self.reference)
+        self._planes = c.TangentPlanes(self.reference)
 
     # ---- stages ----------------------------------------------------------------------------------------
 
@@ -147,7 +145,7 @@ class FairProblem:
         """Variable blocks at ``vertices``; auxiliary variables satisfy their constraints there."""
         if self.settings.formulation == "reduced":
             return {"vertices": vertices}
-        return {"vertices": vertices, **lifted_blocks(vertices, self.topology)}
+        return {"vertices": vertices, **c.lifted_normal_variation_blocks(vertices, self.topology)}
 
     # ---- decisions -------------------------------------------------------------------------------------
 
@@ -192,7 +190,7 @@ class FairProblem:
             return c.normal_variation_terms(self.topology, smoothing=smoothing, weight=settings.energy_weight)
         planar = self.topology.face_sizes == 3
         planar[self.planar_faces] = True
-        return lifted_normal_variation_terms(
+        return c.lifted_normal_variation_terms(
             self.vertices,
             self.topology,
             planar,

@@ -10,7 +10,6 @@ from torch import Tensor
 
 from ... import constraints as c
 from ..._graph import graph_laplacian
-from ...constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks, lifted_absolute_curvature_terms
 from ...energies import total_absolute_curvature
 from ...geometry import corner_angles, vertex_normals
 from ...geometry.spline_curves import SplineCurves
@@ -104,7 +103,7 @@ class FormProblem:
         """Variable blocks at ``vertices``."""
         if self.settings.formulation == "reduced":
             return {"vertices": vertices}
-        return {"vertices": vertices, **lifted_absolute_curvature_blocks(vertices, self.topology)}
+        return {"vertices": vertices, **c.lifted_absolute_curvature_blocks(vertices, self.topology)}
 
     def terms(self, vertices: Tensor, smoothing: float, fairness_weight: float | None = None) -> list[ElementTerm]:
         """Terms whose unknowns are the vertices, or those of the lifted formulation.
@@ -120,7 +119,7 @@ class FormProblem:
         others = [*self._others(vertices, fairness), *pulls, *self._spreading()]
         if settings.formulation == "reduced":
             return [*self._curvature(smoothing), *self._bending(smoothing), *others]
-        lifted = lifted_absolute_curvature_terms(
+        lifted = c.lifted_absolute_curvature_terms(
             self.topology,
             smoothing=smoothing,
             weight=settings.curvature_weight,

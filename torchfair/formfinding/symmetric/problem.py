@@ -11,12 +11,6 @@ import torch
 from torch import Tensor
 
 from ... import constraints as c
-from ...constraints.closeness import TangentPlanes
-from ...constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
-from ...constraints.lifted_normal_variation import lifted_blocks as lifted_energy_blocks
-from ...constraints.lifted_normal_variation import lifted_normal_variation_terms
-from ...constraints.lifted_principal_symmetric import lifted_blocks, lifted_principal_symmetric_terms
-from ...constraints.principal_symmetric import between_stars, sphere_blocks
 from ...constraints.saddle_sides import SaddleSides
 from ...geometry import corner_angles
 from ...geometry.closest_point import ReferenceSurface
@@ -71,7 +65,7 @@ class SymmetricProblem:
     ) -> None:
         self.base, self.principal, self.stars, self.settings = base, principal, stars, settings
         self.topology, self.stays, self.pulls = principal.topology, stays, pulls
-        self.edges = between_stars(self.topology.edges[principal.mask], stars)
+        self.edges = c.between_stars(self.topology.edges[principal.mask], stars)
         self.sides = SaddleSides(stars, margin=settings.saddle_margin)
         self._reference = reference
         self.forget()
@@ -95,7 +89,7 @@ class SymmetricProblem:
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""
-        self._planes = None if self._reference is None else TangentPlanes(self._reference)
+        self._planes = None if self._reference is None else c.TangentPlanes(self._reference)
         self._kept: dict[tuple[object, SymmetricSettings], list[ElementTerm]] = {}
 
     # ---- stages ----------------------------------------------------------------------------------------
@@ -103,16 +97,17 @@ class SymmetricProblem:
     def blocks(self, vertices: Tensor) -> State:
         """Variable blocks that fit ``vertices``."""
         if self.settings.formulation == "spheres":
-            return {"vertices": vertices, **sphere_blocks(vertices, self.stars)}
+            return {"vertices": vertices, **c.sphere_blocks(vertices, self.stars)}
         if self.settings.formulation == "lifted":
-            return self._with_energy({"vertices": vertices, **lifted_blocks(vertices, self.edges, self.stars)})
+            lifted = c.lifted_principal_symmetric_blocks(vertices, self.edges, self.stars)
+            return self._with_energy({"vertices": vertices, **lifted})
         return {"vertices": vertices}
 
     def _with_energy(self, state: State) -> State:
         """With the paper's variables of E that fit the vertices, where E is lowered in these."""
         if not self._lifts_energy:
             return state
-        return {**state, **lifted_energy_blocks(state["vertices"], self.topology)}
+        return {**state, **c.lifted_normal_variation_blocks(state["vertices"], self.topology)}
 
     @property
     def _lifts_energy(self) -> bool:
@@ -182,9 +177,9 @@ class SymmetricProblem:
 
     def _conditions(self, weight: float) -> list[ElementTerm]:
         if self.settings.formulation == "eliminated":
-            return eliminated_principal_symmetric_terms(self.edges, self.stars, weight=weight)
+            return c.eliminated_principal_symmetric_terms(self.edges, self.stars, weight=weight)
         if self.settings.formulation == "lifted":
-            return lifted_principal_symmetric_terms(self.edges, self.stars, self.sides.is_saddle, weight=weight)
+            return c.lifted_principal_symmetric_terms(self.edges, self.stars, self.sides.is_saddle, weight=weight)
         return [
             *c.cospherical_terms(self.stars, weight=weight),
             *c.coplanar_terms(self.edges, self.stars, weight=weight),
@@ -202,7 +197,7 @@ class SymmetricProblem:
             return []
         if self._lifts_energy:
             planar = torch.ones(self.topology.num_faces, dtype=torch.bool)
-            return lifted_normal_variation_terms(
+            return c.lifted_normal_variation_terms(
                 self.base, self.topology, planar, weight=settings.energy_weight, constraint_weight=constraint_weight
             )
         return c.normal_variation_terms(
