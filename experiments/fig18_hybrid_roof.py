@@ -21,7 +21,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.cameras import Camera
-from torchfair.constraints.lifted_normal_variation import lifted_blocks
+from torchfair.constraints import lifted_normal_variation_blocks
 from torchfair.formfinding import FairSettings, JobResult, Level, minimise_normal_variation
 from torchfair.geometry import edge_lengths
 from torchfair.shapes import hybrid_roof
@@ -98,7 +98,9 @@ def run_job(vertices: Tensor, topology: Topology, config: Config, formulation: s
         "notes": result.notes,
     }
     if formulation == "lifted":
-        report["unknowns"] += sum(block.numel() for block in lifted_blocks(vertices, topology).values())
+        report["unknowns"] += sum(
+            block.numel() for block in lifted_normal_variation_blocks(vertices, topology).values()
+        )
     return result, report
 
 

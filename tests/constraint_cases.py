@@ -201,6 +201,9 @@ CASES: dict[str, Case] = {
         mixed,
         power=1,
     ),
+    "straight fairness": Case(
+        lambda v, t: c.StraightFairness(t), lambda v, t: c.polyline_fairness_terms(t, weight=1.0), mixed
+    ),
     "tangent patches": Case(
         lambda v, t: c.TangentPatches(v, t, rim(t), tilted(v, t)),
         lambda v, t: c.tangent_patch_terms(v, t, rim(t), tilted(v, t), weight=1.0),

@@ -14,12 +14,6 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair import constraints as c
 from torchfair.boundary import boundary_corners, boundary_pieces
-from torchfair.constraints import lifted_absolute_curvature as lifted_c
-from torchfair.constraints.closeness import TangentPlanes
-from torchfair.constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
-from torchfair.constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
-from torchfair.constraints.lifted_principal_symmetric import lifted_blocks as lifted_spheres
-from torchfair.constraints.lifted_principal_symmetric import lifted_principal_symmetric_terms
 from torchfair.geometry import corner_angles, face_areas, vertex_normals
 from torchfair.geometry.closest_point import ReferenceSurface
 from torchfair.geometry.spline_curves import SplineCurves
@@ -96,13 +90,14 @@ case("corner_angle_terms", triangles, mixed)(
     lambda v, t: c.corner_angle_terms(t, 0.01, 1.5 * corner_angles(v, t), weight=1.0)
 )
 case("eliminated_principal_symmetric_terms", lattice)(
-    lambda v, t, edges, stars: eliminated_principal_symmetric_terms(edges, stars, weight=2.0)
+    lambda v, t, edges, stars: c.eliminated_principal_symmetric_terms(edges, stars, weight=2.0)
 )
 case("even_fairness_terms", triangles)(lambda v, t: c.even_fairness_terms(v, t, weight=0.5))
 case("even_star_terms", lattice)(lambda v, t, edges, stars: c.even_star_terms(stars, weight=0.5))
 case("face_area_terms", triangles, mixed)(lambda v, t: c.face_area_terms(t, 2.5 * face_areas(v, t), weight=0.5))
 case("interior_fairness_terms", triangles, mixed)(lambda v, t: c.interior_fairness_terms(t, weight=0.5))
 case("normal_variation_terms", triangles, mixed)(lambda v, t: c.normal_variation_terms(t, smoothing=0.1))
+case("polyline_fairness_terms", triangles, mixed)(lambda v, t: c.polyline_fairness_terms(t, weight=0.5))
 case("pyramid_terms", triangles, mixed)(lambda v, t: c.pyramid_terms(t, weight=0.5))
 
 
@@ -126,7 +121,7 @@ def _(vertices: Tensor, topology: Topology) -> Terms:
 
 @case("closeness_terms", triangles, mixed)
 def _(vertices: Tensor, topology: Topology) -> Case:
-    planes = TangentPlanes(ReferenceSurface(vertices, topology))
+    planes = c.TangentPlanes(ReferenceSurface(vertices, topology))
     chosen = torch.nonzero(topology.valences > 3).squeeze(1)
     return {"vertices": moved(vertices)}, c.closeness_terms(planes, chosen, weight=0.5)
 
@@ -171,7 +166,7 @@ def _(vertices: Tensor, topology: Topology) -> Case:
 
 @case("distance_limit_terms", triangles)
 def _(vertices: Tensor, topology: Topology) -> Case:
-    planes = TangentPlanes(ReferenceSurface(vertices, topology))
+    planes = c.TangentPlanes(ReferenceSurface(vertices, topology))
     state = {"vertices": moved(vertices)}
     return state, c.distance_limit_terms(planes, torch.full_like(vertices[:, 0], 0.1), weight=0.5)
 
@@ -193,25 +188,23 @@ def _(vertices: Tensor, topology: Topology) -> Terms:
 
 @case("lifted_absolute_curvature_terms", triangles)
 def _(vertices: Tensor, topology: Topology) -> Case:
-    blocks = lifted_c.lifted_absolute_curvature_blocks(
-        vertices.cpu(), topology.to("cpu")
-    )  # signs of eigenvectors are open
+    blocks = c.lifted_absolute_curvature_blocks(vertices.cpu(), topology.to("cpu"))  # signs of eigenvectors are open
     blocks = {"vertices": moved(vertices), **{name: block.to(vertices) for name, block in blocks.items()}}
-    return blocks, lifted_c.lifted_absolute_curvature_terms(topology, smoothing=0.1)
+    return blocks, c.lifted_absolute_curvature_terms(topology, smoothing=0.1)
 
 
 @case("lifted_normal_variation_terms", triangles, mixed)
 def _(vertices: Tensor, topology: Topology) -> Case:
     planar = topology.face_sizes == 3
-    terms = lifted_normal_variation_terms(vertices, topology, planar, weight=0.5, constraint_weight=10.0)
-    return {"vertices": moved(vertices), **lifted_blocks(vertices, topology)}, terms
+    terms = c.lifted_normal_variation_terms(vertices, topology, planar, weight=0.5, constraint_weight=10.0)
+    return {"vertices": moved(vertices), **c.lifted_normal_variation_blocks(vertices, topology)}, terms
 
 
 @case("lifted_principal_symmetric_terms", lattice)
 def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars) -> Case:
     is_saddle = torch.ones_like(stars.vertices, dtype=torch.bool)
-    terms = lifted_principal_symmetric_terms(edges, stars, is_saddle, weight=2.0)
-    return {"vertices": moved(vertices), **lifted_spheres(vertices, edges, stars)}, terms
+    terms = c.lifted_principal_symmetric_terms(edges, stars, is_saddle, weight=2.0)
+    return {"vertices": moved(vertices), **c.lifted_principal_symmetric_blocks(vertices, edges, stars)}, terms
 
 
 @case("planarity_terms", mixed)

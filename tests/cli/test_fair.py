@@ -185,3 +185,16 @@ def test_options_reach_the_settings(roof: Path, tmp_path: Path) -> None:
     assert (settings["boundary"], settings["planar"], settings["fairness_weight"]) == ("fixed", "none", 0.7)
     assert {run["solver"] for level in report["levels"] for run in level["runs"]} == {"scipy"}
     assert settings["projection"]["max_iterations"] == 3
+
+
+def test_the_printed_method_is_found_again_by_its_report(roof: Path, tmp_path: Path) -> None:
+    first, second = tmp_path / "first" / "roof.obj", tmp_path / "second" / "roof.obj"
+    preset = ["--preset", "paper,w_target=0.1,steps=3", "--no-pictures"]
+    assert main(["fair", str(roof), "-o", str(first), *preset]) in (0, 1)
+    report = json.loads((first.parent / "report.json").read_text())
+    assert report["request"]["preset"] == "paper,w_target=0.1,steps=3"
+    assert report["settings"]["energy_weight"] == 0.05
+    assert report["settings"]["projection"]["step_policy"] == "every"
+    again = ["--settings", str(first.parent / "report.json"), "--no-pictures"]
+    assert main(["fair", str(roof), "-o", str(second), *again]) in (0, 1)
+    assert second.read_bytes() == first.read_bytes()

@@ -129,6 +129,21 @@ def test_faults_of_options_and_files_are_command_errors(tmp_path: Path) -> None:
         parse(fair.COMMAND, "--settings", str(tmp_path / "mine.json"))
 
 
+@pytest.mark.parametrize("command", JOBS[:3])
+def test_a_preset_gives_all_settings_and_options_win_over_it(command: JobCommand) -> None:
+    found = parse(command, "--preset", "paper,w_fair=0.5", "--handle-weight", "4")
+    assert found == dataclasses.replace(command.settings().paper(w_fair=0.5), handle_weight=4.0)
+
+
+def test_faults_of_presets_are_command_errors(tmp_path: Path) -> None:
+    with pytest.raises(CommandError, match="presets are paper, got 'ours'"):
+        parse(fair.COMMAND, "--preset", "ours")
+    with pytest.raises(CommandError, match="--preset and --settings both give all settings"):
+        parse(fair.COMMAND, "--preset", "paper", "--settings", str(tmp_path / "mine.json"))
+    with pytest.raises(CommandError, match="unrecognized arguments: --preset paper"):
+        parse(denoise.COMMAND, "--preset", "paper")
+
+
 def test_switches_are_flags_that_can_be_taken_back() -> None:
     @dataclasses.dataclass(frozen=True)
     class Settings:

@@ -11,7 +11,7 @@ from torchfair.constraints import absolute_curvature_terms
 from torchfair.errors import MeshError
 from torchfair.geometry import shape_operators
 from torchfair.projection import symmetric_matrix
-from torchfair.projection.term import differentiate
+from torchfair.projection.differentiation import differentiate
 from torchfair.shapes import FreeFormPatch, ShapeMesh, Torus, icosphere, irregular_triangles
 
 
@@ -62,7 +62,7 @@ def test_a_flat_mesh_has_no_merit_and_no_gradient() -> None:
     flat = vertices * torch.tensor([1.0, 1.0, 0.0], dtype=torch.float64)
     for term in absolute_curvature_terms(topology, smoothing=1e-3):
         arguments = term.arguments({"vertices": flat})
-        values, jacobians = term.derivatives(arguments)
+        values, jacobians = term.linearised(arguments)
         assert float(values.abs().max()) < 1e-15
         assert bool(torch.isfinite(jacobians).all())
         assert float(term.contributions(arguments, values).abs().max()) < 1e-15

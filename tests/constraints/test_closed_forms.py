@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -27,7 +28,8 @@ CPU = torch.device("cpu")
 
 def assert_closed_form_is_the_derivative(term: ElementTerm, state: State) -> Tensor:
     arguments = term.arguments(state)
-    closed, (values, expected) = term.jacobians(arguments), term.automatic_derivatives(arguments)
+    closed = replace(term, derivatives="closed form").jacobians(arguments)
+    values, expected = replace(term, derivatives=None).automatic_derivatives(arguments)
     assert closed.shape == expected.shape
     torch.testing.assert_close(closed, expected, rtol=1e-8, atol=1e-9 * float(expected.abs().max()))
     return values

@@ -22,7 +22,7 @@ from torchfair.constraints.tangent_planes import tangent_frames
 from torchfair.errors import ShapeError
 from torchfair.geometry import umbrella_vectors, vertex_normals
 from torchfair.geometry.closest_point import ReferenceSurface
-from torchfair.projection.term import differentiate
+from torchfair.projection.differentiation import differentiate
 from torchfair.shapes import Cylinder, principal_triangles
 
 VERTICES, TOPOLOGY = wavy_grid(7, 6, triangles=True)

@@ -56,7 +56,7 @@ def test_the_merit_is_half_the_weight_times_the_squared_distance() -> None:
 def test_model_and_merit_agree_to_first_order(size: float) -> None:
     """Along random directions, at curved places, beside and beyond ends, by central differences."""
     vertices, term, step = scattered(size), gliding(40), 1e-5
-    values, jacobians = term.derivatives(term.arguments({"vertices": vertices}))
+    values, jacobians = term.linearised(term.arguments({"vertices": vertices}))
     for seed in range(4):
         way = torch.randn(vertices.shape, dtype=DOUBLE, generator=torch.Generator().manual_seed(seed))
         ahead, behind = (merit(term, vertices + sign * step * way) for sign in (1.0, -1.0))
@@ -68,7 +68,7 @@ def test_on_the_curve_the_model_agrees_to_second_order() -> None:
     vertices, term = scattered(0.0), gliding(40)
     feet = feet_of(40)({"vertices": vertices})
     inside = ~(vertices[1:, None] == ARC[[0, -1]]).all(-1).any(1)
-    values, jacobians = term.derivatives(term.arguments({"vertices": vertices}))
+    values, jacobians = term.linearised(term.arguments({"vertices": vertices}))
     assert float(values.abs().max()) == 0.0
     way = torch.randn(vertices.shape, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
     model = 0.5 * WEIGHT * torch.einsum("nmk,nk->nm", jacobians, way[1:]).square().sum(1)
@@ -85,7 +85,7 @@ def test_the_closed_form_of_the_derivative() -> None:
     arguments = term.arguments({"vertices": scattered(0.3)})
     by_hand = term.jacobians(arguments)
     plain = ElementTerm(term.name, term.residual, term.stencil, batched=True)
-    torch.testing.assert_close(by_hand, plain.derivatives(arguments)[1], rtol=0, atol=1e-15)
+    torch.testing.assert_close(by_hand, plain.linearised(arguments)[1], rtol=0, atol=1e-15)
 
 
 def test_beyond_an_end_nothing_is_free() -> None:
@@ -93,7 +93,7 @@ def test_beyond_an_end_nothing_is_free() -> None:
     outside, beside = ARC[0] + tangent, ARC[2] + torch.tensor([0.0, 0.0, 0.1], dtype=DOUBLE)
     vertices = torch.stack([outside, outside, outside, beside, beside])
     term = gliding(4)  # 2 and 4 on the arc
-    _, jacobians = term.derivatives(term.arguments({"vertices": vertices}))
+    _, jacobians = term.linearised(term.arguments({"vertices": vertices}))
     assert torch.equal(jacobians[1], torch.eye(3, dtype=DOUBLE))
     assert torch.linalg.matrix_rank(jacobians[3]) == 2
 

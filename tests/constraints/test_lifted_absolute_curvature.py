@@ -201,7 +201,7 @@ def test_single_precision_stays_single() -> None:
     vertices, topology = MESHES["crumpled"]()
     state = start((vertices.float(), topology))
     for term in lifted_absolute_curvature_terms(topology, smoothing=0.1):
-        assert {t.dtype for t in term.derivatives(term.arguments(state))} == {torch.float32}
+        assert {t.dtype for t in term.linearised(term.arguments(state))} == {torch.float32}
 
 
 def test_other_polygons_are_refused() -> None:

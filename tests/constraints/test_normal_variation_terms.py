@@ -112,4 +112,4 @@ def test_term_uses_the_closed_gradient() -> None:
     arguments = term.arguments({"vertices": vertices})
     expected = torch.func.vmap(torch.func.jacrev(triangle_pair_bend))(*arguments).flatten(1)
     assert term.jacobian is triangle_pair_bend_gradient
-    assert term.derivatives(arguments)[1][:, 0].allclose(expected, atol=1e-9)
+    assert term.linearised(arguments)[1][:, 0].allclose(expected, atol=1e-9)

@@ -22,7 +22,7 @@ from torchfair.geometry import corner_angles
 from torchfair.principal import principal_edges_of_lattice
 from torchfair.principal.principal_edges import PrincipalStars
 from torchfair.principal.spheres import spheres_through
-from torchfair.projection.term import differentiate
+from torchfair.projection.differentiation import differentiate
 from torchfair.shapes import Catenoid, Torus, principal_triangles
 from torchfair.stars import pyramid_self_intersections
 

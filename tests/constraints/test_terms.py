@@ -12,7 +12,7 @@ from torch import Tensor
 from torchfair import Topology, constraints
 from torchfair.boundary import boundary_corners, boundary_pieces
 from torchfair.constraints.closeness import TangentPlanes
-from torchfair.constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
+from torchfair.constraints.lifted_normal_variation import lifted_normal_variation_blocks, lifted_normal_variation_terms
 from torchfair.constraints.normal_variation import edge_stencils
 from torchfair.energies import normal_variation
 from torchfair.geometry import corner_angles, dihedral_angles, dual_edge_lengths, edge_lengths, face_areas
@@ -82,7 +82,7 @@ def test_bend_residual_has_the_sign_of_the_dihedral_angle_and_passes_smoothly_th
     (term,) = constraints.normal_variation_terms(topology, smoothing=1e-2)
     assert torch.equal(values(term, vertices)[:, 0].sign(), dihedral_angles(vertices, topology).sign())
     flat = vertices * torch.tensor([1.0, 1.0, 0.0], dtype=DOUBLE)
-    residuals, jacobians = term.derivatives(term.arguments({"vertices": flat}))
+    residuals, jacobians = term.linearised(term.arguments({"vertices": flat}))
     assert (residuals.abs() < 1e-14).all()
     assert torch.isfinite(jacobians).all()
     assert (jacobians.flatten(1).abs().amax(1) > 0.1).all()  # a flat edge still feels its bending
@@ -189,7 +189,7 @@ def test_closeness_is_the_distance_and_points_away_from_the_surface() -> None:
     planes = TangentPlanes(ReferenceSurface(vertices, topology))
     points = torch.tensor([[0.5, 0.5, 1.4], [1.3, 1.4, 0.5], [0.5, 0.4, 0.9], [-0.3, -0.4, -1.0]], dtype=DOUBLE)
     (term,) = constraints.closeness_terms(planes, torch.arange(4), weight=1.0)
-    residuals, jacobians = term.derivatives(term.arguments({"vertices": points}))
+    residuals, jacobians = term.linearised(term.arguments({"vertices": points}))
     expected = torch.tensor([0.4, 0.5, 0.1, math.sqrt(0.09 + 0.16 + 1.0)], dtype=DOUBLE)
     assert residuals[:, 0].abs().allclose(expected)
     feet = torch.tensor([[0.5, 0.5, 1.0], [1.0, 1.0, 0.5], [0.5, 0.4, 1.0], [0, 0, 0]], dtype=DOUBLE)
@@ -246,7 +246,7 @@ def test_gliding_is_free_along_the_curve_and_stops_at_its_ends() -> None:
     feet = constraints.CurveFeet(curves, torch.arange(3), torch.zeros(3, dtype=torch.int64))
     (term,) = constraints.gliding_terms(feet, weight=1.0)
     points = torch.tensor([[0.7, 0.3, 0.4], [2.6, 0.8, 0.0], [-0.8, 0.0, 0.6]], dtype=DOUBLE)
-    residuals, jacobians = term.derivatives(term.arguments({"vertices": points}))
+    residuals, jacobians = term.linearised(term.arguments({"vertices": points}))
     assert torch.linalg.vector_norm(residuals, dim=1).allclose(torch.tensor([0.5, 1.0, 1.0], dtype=DOUBLE))
     assert (jacobians[0, :, 0].abs() < 1e-14).all()
     assert jacobians[1:].allclose(torch.eye(3, dtype=DOUBLE))
@@ -262,7 +262,7 @@ def test_boundary_pieces_and_gliding_need_no_boundary() -> None:
 def test_lifted_variables_satisfy_their_constraints_and_carry_the_energy(name: str) -> None:
     vertices, topology = MESHES[name]()
     planar = topology.face_sizes == 3 if name != "cube" else torch.ones(topology.num_faces, dtype=torch.bool)
-    state = {"vertices": vertices, **lifted_blocks(vertices, topology)}
+    state = {"vertices": vertices, **lifted_normal_variation_blocks(vertices, topology)}
     terms = lifted_normal_variation_terms(vertices, topology, planar, weight=1.0, constraint_weight=10.0)
     for term in terms[:-1]:
         assert term.weight == 10.0

@@ -160,8 +160,8 @@ def test_closed_form_jacobian_replaces_differentiation() -> None:
     plain = ElementTerm("length", stretched, [("vertices", topology.edges)], (lengths,))
     closed = ElementTerm("length", stretched, [("vertices", topology.edges)], (lengths,), jacobian=derivative)
     for mine, other in zip(
-        closed.derivatives(closed.arguments({"vertices": vertices})),
-        plain.derivatives(plain.arguments({"vertices": vertices})),
+        closed.linearised(closed.arguments({"vertices": vertices})),
+        plain.linearised(plain.arguments({"vertices": vertices})),
         strict=True,
     ):
         assert mine.allclose(other, atol=1e-14)
@@ -173,7 +173,7 @@ def test_forward_mode_is_used_for_long_residuals_and_agrees() -> None:
     def powers(row: Tensor) -> Tensor:
         return torch.cat([row[0], row[0] ** 2, row[0] ** 3])
 
-    from torchfair.projection.term import differentiate
+    from torchfair.projection.differentiation import differentiate
 
     values, jacobians = differentiate(powers, (x,), 1)
     assert values.shape == (5, 6)

@@ -37,7 +37,7 @@ def test_a_term_of_all_elements_at_once_equals_that_of_one() -> None:
     one = edge_term(topology)
     all_at_once = replace(one, residual=stretches, batched=True)
     arguments = one.arguments({"vertices": vertices})
-    for mine, other in zip(one.derivatives(arguments), all_at_once.derivatives(arguments), strict=True):
+    for mine, other in zip(one.linearised(arguments), all_at_once.linearised(arguments), strict=True):
         torch.testing.assert_close(mine, other, atol=1e-14, rtol=1e-14)
 
 

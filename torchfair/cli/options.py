@@ -27,6 +27,7 @@ _TUNED = "tuned together with the job; a settings file can change it"
 HIDDEN = {
     f"projection.{name}": _TUNED
     for name in (
+        "step_policy",
         "initial_damping",
         "damping_scale",
         "gradient_tolerance",
@@ -44,6 +45,8 @@ HIDDEN = {
 class SettingOptions(Generic[S]):
     """One option for every field of a settings dataclass, ``--settings FILE`` for all, and the settings they give.
 
+    Dataclasses with presets have ``--preset`` too, for all fields at once.
+
     Defaults are those of the dataclass, help is its docstring. An option has the name of its field, without
     ``_weight`` unless another field has that name; angles are in degrees.
 
@@ -58,8 +61,9 @@ class SettingOptions(Generic[S]):
     """
 
     def __init__(self, kind: type[S], job: str, names: Mapping[str, str]) -> None:
-        from ..settings import fields_of
+        from ..settings import fields_of, presets_of
 
+        self._presets = presets_of(kind)
         self._kind, self._job, self._fields = kind, job, fields_of(kind)
         chosen = {**SHORTER, **names}
         self.hidden = {name: reason for name, reason in HIDDEN.items() if name in self._fields}
@@ -78,6 +82,13 @@ class SettingOptions(Generic[S]):
             help=f"TOML or JSON file of settings, such as the report.json of an earlier 'torchfair {self._job}', whose "
             "result is found again",
         )
+        if self._presets:
+            group.add_argument(
+                "--preset",
+                metavar="PRESET",
+                help=f"instead of a file: {', '.join(self._presets)}, for guided projection as printed there, to be "
+                "compared with; its own numbers after commas, as in paper,w_fair=0.3",
+            )
         for name, option in self.names.items():
             field = self._fields[name]
             if field.is_switch:
@@ -92,18 +103,25 @@ class SettingOptions(Generic[S]):
         """The settings that arguments ask for.
 
         Raises:
-            CommandError: a value is out of its range, or the settings file is at fault.
+            CommandError: a value is out of its range, the settings file is at fault, or there is a preset beside it.
         """
-        from ..settings import read_settings
         from ..settings.files import with_fields
 
         given = {name.removeprefix(_DEST): value for name, value in vars(arguments).items() if name.startswith(_DEST)}
         try:
-            file = arguments.settings
-            settings = self._kind() if file is None else read_settings(file, self._kind, job=self._job)
-            return with_fields(settings, given)
+            return with_fields(self._basis(arguments.settings, getattr(arguments, "preset", None)), given)
         except SettingsError as error:
             raise CommandError(str(error)) from None
+
+    def _basis(self, file: str | None, preset: str | None) -> S:
+        """What options change."""
+        from ..settings import preset_settings, read_settings
+
+        if file is not None and preset is not None:
+            raise CommandError("--preset and --settings both give all settings: a report holds those of its preset")
+        if preset is not None:
+            return preset_settings(preset, self._kind)
+        return self._kind() if file is None else read_settings(file, self._kind, job=self._job)
 
 
 def option_help(field: SettingField) -> str:

@@ -24,11 +24,13 @@ from .fairness import BoundaryFairness as BoundaryFairness
 from .fairness import DisplacementFairness as DisplacementFairness
 from .fairness import EvenFairness as EvenFairness
 from .fairness import InteriorFairness as InteriorFairness
+from .fairness import StraightFairness as StraightFairness
 from .fairness import TangentialFairness as TangentialFairness
 from .fairness import boundary_fairness_terms as boundary_fairness_terms
 from .fairness import displacement_fairness_terms as displacement_fairness_terms
 from .fairness import even_fairness_terms as even_fairness_terms
 from .fairness import interior_fairness_terms as interior_fairness_terms
+from .fairness import polyline_fairness_terms as polyline_fairness_terms
 from .fairness import tangential_fairness_terms as tangential_fairness_terms
 from .flat_edges import FlatEdges as FlatEdges
 from .flat_edges import flat_edge_terms as flat_edge_terms
@@ -37,6 +39,12 @@ from .gliding import Gliding as Gliding
 from .gliding import gliding_terms as gliding_terms
 from .handles import Handles as Handles
 from .handles import handle_terms as handle_terms
+from .lifted_absolute_curvature import lifted_absolute_curvature_blocks as lifted_absolute_curvature_blocks
+from .lifted_absolute_curvature import lifted_absolute_curvature_terms as lifted_absolute_curvature_terms
+from .lifted_normal_variation import lifted_normal_variation_blocks as lifted_normal_variation_blocks
+from .lifted_normal_variation import lifted_normal_variation_terms as lifted_normal_variation_terms
+from .lifted_principal_symmetric import lifted_principal_symmetric_blocks as lifted_principal_symmetric_blocks
+from .lifted_principal_symmetric import lifted_principal_symmetric_terms as lifted_principal_symmetric_terms
 from .normal_variation import SmoothNormalVariation as SmoothNormalVariation
 from .normal_variation import normal_variation_terms as normal_variation_terms
 from .planarity import Planarity as Planarity

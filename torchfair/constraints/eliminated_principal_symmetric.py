@@ -59,7 +59,8 @@ def eliminated_principal_symmetric_terms(
     """Both conditions of section 2.3 as functions of the vertices.
 
     One residual for each star and one for each edge, which depend on 5 and on 8 vertices: fewest unknowns, but a
-    normal matrix with many more entries than with :func:`~torchfair.constraints.cospherical_terms`.
+    normal matrix with many more entries than with :func:`~torchfair.constraints.cospherical_terms`. They are
+    differentiated by sums, which is faster here than the closed forms that there are, too.
 
     Args:
         edges: (n, 2) principal edges between stars.
@@ -80,6 +81,7 @@ def _cospherical_term(stars: PrincipalStars, weight: float, block: str) -> Eleme
         [(block, _reach(stars))],
         weight=4.0 * weight,  # four neighbours miss the sphere alike
         jacobian=eliminated_cospherical_derivative,
+        derivatives="sums",  # a third faster than the closed form from some thousand stars on
         batched=True,
     )
 
@@ -92,6 +94,7 @@ def _coplanar_term(edges: Tensor, stars: PrincipalStars, weight: float, block: s
         [(block, ends.flatten(1))],
         weight=weight,
         jacobian=eliminated_coplanar_derivative,
+        derivatives="sums",
         batched=True,
     )
 

@@ -61,6 +61,26 @@ def interior_fairness_terms(topology: Topology, *, weight: float, block: str = "
     return terms
 
 
+def polyline_fairness_terms(
+    topology: Topology, *, weight: float, corners: Tensor | None = None, block: str = "vertices"
+) -> list[ElementTerm]:
+    """Second differences along all mesh polylines, the paper's fairness of section 5.1; on triangle meshes, too.
+
+    Polylines run straight through vertices of even valence and along the boundary, see
+    :func:`~torchfair.straight_triples`; vertices of odd valence have none.
+
+    Args:
+        topology: Any polygon mesh.
+        weight: Of ``|v_- - 2 v + v_+|^2 / 8``, see :func:`second_difference`.
+        corners: (V,) bool, boundary vertices at which the boundary turns.
+        block: Name of the vertex block.
+    """
+    triples = straight_triples(topology, corners=corners)
+    if not triples.numel():
+        return []
+    return [ElementTerm("fairness", second_difference, [(block, triples)], weight=weight, linear=True)]
+
+
 def boundary_fairness_terms(
     topology: Topology, corners: Tensor, *, weight: float, block: str = "vertices"
 ) -> list[ElementTerm]:
@@ -172,6 +192,20 @@ class InteriorFairness(Constraint):
 
     def __init__(self, topology: Topology) -> None:
         super().__init__(interior_fairness_terms(topology, weight=1.0))
+
+
+class StraightFairness(Constraint):
+    """Module form of :func:`polyline_fairness_terms`: an eighth of the sum of squared second differences.
+
+    In length squared; an eighth of :class:`~torchfair.energies.PolylineFairness` where both have the same corners.
+
+    Args:
+        topology: Any polygon mesh.
+        corners: (V,) bool, where the boundary may turn.
+    """
+
+    def __init__(self, topology: Topology, corners: Tensor | None = None) -> None:
+        super().__init__(polyline_fairness_terms(topology, weight=1.0, corners=corners))
 
 
 class BoundaryFairness(Constraint):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import torch
@@ -13,7 +13,7 @@ from ..geometry import face_normals, shape_operators
 from ..geometry.star_normals import star_normals
 from ..geometry.tangent_basis import tangent_bases
 from ..geometry.tangential_shape_operator import restrict
-from ..projection import ElementTerm, SmoothAbsolute, symmetric_components, symmetric_matrix
+from ..projection import ElementTerm, Loss, SmoothAbsolute, symmetric_components, symmetric_matrix
 from ..topology import Topology
 from .absolute_curvature import NAME
 
@@ -108,7 +108,12 @@ def curvature_residual(k: Tensor) -> Tensor:
 
 
 def lifted_absolute_curvature_terms(
-    topology: Topology, *, smoothing: float, weight: float = 1.0, constraint_weight: float = 1e3
+    topology: Topology,
+    *,
+    smoothing: float,
+    weight: float = 1.0,
+    constraint_weight: float = 1e3,
+    absolute: Callable[[float], Loss] = SmoothAbsolute,
 ) -> list[ElementTerm]:
     """Constraints (1) to (8) of the auxiliary variables, and the sum of |k1| + |k2| over all stars as the target.
 
@@ -119,6 +124,8 @@ def lifted_absolute_curvature_terms(
         constraint_weight: Of the constraints, for vertices scaled to edge lengths of about 1. Small weights let
             curvatures become smaller than those of the shape, large ones make steps short: an uneven start
             comes faster to the shape with 100 first and 1000 afterwards.
+        absolute: Makes the absolute value from the smoothing; :class:`~torchfair.projection.LogAbsolute` is reweighted
+            as the paper prints it.
 
     Raises:
         MeshError: a face is not a triangle.
@@ -142,7 +149,7 @@ def lifted_absolute_curvature_terms(
         ElementTerm("orthogonal directions", angle_residual, [directions]),
         ElementTerm("third eigenvalue", trace_residual, [stars, curvatures]),
     ]
-    loss = SmoothAbsolute(smoothing)
+    loss = absolute(smoothing)
     target = ElementTerm(NAME, curvature_residual, [("curvatures", each)], weight=weight, loss=loss)
     return [*(replace(term, weight=constraint_weight) for term in constraints if term.num_elements), target]
 

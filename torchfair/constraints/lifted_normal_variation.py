@@ -15,7 +15,7 @@ from ..topology import Topology
 from .normal_variation import NAME, area_vector
 
 
-def lifted_blocks(vertices: Tensor, topology: Topology) -> dict[str, Tensor]:
+def lifted_normal_variation_blocks(vertices: Tensor, topology: Topology) -> dict[str, Tensor]:
     """Auxiliary variables that satisfy their defining constraints at ``vertices``.
 
     Returns:

@@ -20,7 +20,7 @@ CENTRES, PLANES, SLACKS = "sphere centres", "edge planes", "slacks"
 LARGEST_RADIUS = 1e3  # mean edge lengths
 
 
-def lifted_blocks(vertices: Tensor, edges: Tensor, stars: PrincipalStars) -> State:
+def lifted_principal_symmetric_blocks(vertices: Tensor, edges: Tensor, stars: PrincipalStars) -> State:
     """Centres (R, 3), unit normals of the planes of edges (n, 3) and slacks (R, 2) that fit ``vertices``."""
     spheres = star_spheres(vertices, stars)
     bent = torch.where(spheres.curvatures < 0, -1.0, 1.0) * spheres.curvatures.abs().clamp_min(1.0 / LARGEST_RADIUS)

@@ -2,6 +2,7 @@
 
 from .guided_projection import GuidedProjection as GuidedProjection
 from .guided_projection import guided_projection as guided_projection
+from .loss import LogAbsolute as LogAbsolute
 from .loss import Loss as Loss
 from .loss import OneSided as OneSided
 from .loss import SmoothAbsolute as SmoothAbsolute

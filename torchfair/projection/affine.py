@@ -40,7 +40,7 @@ class AffinePart:
         self._terms = [compiled.term for compiled in terms]
         matrices, offsets, roots = [], [], []
         for compiled in terms:
-            values, jacobians = compiled.term.derivatives(compiled.term.arguments(origin))
+            values, jacobians = compiled.term.linearised(compiled.term.arguments(origin))
             root = compiled.term.roots(values)
             n, m, k = jacobians.shape
             entries = (jacobians * root[:, None, None]).cpu().numpy()

@@ -12,8 +12,14 @@ _LARGEST_CORRECTION = 0.75  # of the step, in the norm of the damping (Transtrum
 
 
 def try_candidates(trials: Trials, proposal: Proposal, state: ProjectionState) -> None:
-    """Offers the step, the step corrected for curvature, and a longer one where it gained more than promised."""
+    """Offers the step, the step corrected for curvature, and a longer one where it gained more than promised.
+
+    Where every step is taken, that is all that is tried.
+    """
     change, settings = proposal.change, state.settings
+    if settings.takes_every_step:
+        trials.take(change)
+        return
     trial = trials.offer(change)
     bent = [gain < settings.least_uncorrected_gain for gain in trials.gains]
     if trial is not None and any(bent):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import torch
 from torch import Tensor
@@ -12,6 +12,7 @@ from torch import Tensor
 from .._numbers import is_number
 from .._shown import shown
 from ..errors import ShapeError
+from .differentiation import Way
 from .loss import Squares, is_one_sided
 
 if TYPE_CHECKING:
@@ -45,6 +46,9 @@ def check_term(term: ElementTerm, layout: Layout) -> None:
         function = getattr(term, part)
         if not callable(function) and (function is not None or part == "residual"):
             raise ShapeError(f"{what}, {part}", "a function", shown(function))
+    check_way(what, term.derivatives)
+    if term.derivatives == "closed form" and term.jacobian is None:
+        raise ShapeError(f"{what}, derivatives", "a jacobian, which is the closed form", "none")
     _check_stencil(what, term.stencil, layout)
     check_data(f"{what}, data", term.data, term.num_elements, layout.dtype, layout.device)
     _check_weights(what, term, layout)
@@ -56,6 +60,12 @@ def check_term(term: ElementTerm, layout: Layout) -> None:
         raise ShapeError(what, "inequalities without a merit of their own", "one")
     if term.refresh is not None and len(term.data):
         raise ShapeError(what, "data or refresh, which returns all data of a state", "both")
+
+
+def check_way(what: str, way: object) -> None:
+    """Raises ShapeError unless this is a way to differentiate, or None."""
+    if way is not None and way not in get_args(Way):
+        raise ShapeError(f"{what}, derivatives", f"one of {', '.join(get_args(Way))}, or None", shown(way))
 
 
 def check_data(what: str, data: object, count: int, dtype: torch.dtype, device: torch.device) -> None:

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from .declarations import check_declarations
+from .differentiation import Way
 from .layout import Layout
 from .term import ElementTerm, Residual
 
@@ -25,7 +26,7 @@ class CompiledTerm:
 
     def __init__(self, term: ElementTerm, layout: Layout) -> None:
         self.term = term
-        self.verified: tuple[Residual, Residual | None, bool] | None = None
+        self.verified: tuple[Residual, Residual | None, bool, Way | None] | None = None
         unknowns, nodes, self.widths = [], [], []
         for name, index in term.stencil:
             width = layout.sizes[name][1]
@@ -39,7 +40,7 @@ class CompiledTerm:
 
     def verify(self, arguments: tuple[Tensor, ...]) -> None:
         """Tries at a few elements what the term declares; once, also for later data, weights and losses."""
-        functions = (self.term.residual, self.term.jacobian, self.term.batched)
+        functions = (self.term.residual, self.term.jacobian, self.term.batched, self.term.derivatives)
         if self.verified != functions:
             check_declarations(self.term, arguments)
             self.verified = functions

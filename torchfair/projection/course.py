@@ -63,7 +63,7 @@ class Course:
         damping: Of the next step.
         accuracy: Relative remainder asked of an iterative linear solver.
         iteration: Damped steps tried so far.
-        falls: Relative decreases of the merit in the last accepted steps.
+        falls: Relative decreases of the merit in the last accepted steps; negative ones only where every step is taken.
         last: What became of the last step.
         suspicion: Status that the run ends with if a minimum is certified here.
         doubted: Whether this state was suspected before.
@@ -100,6 +100,8 @@ class Course:
             inexact: Whether the linear solver is only as accurate as asked for.
         """
         iteration = self.iteration + 1
+        if not outcome.accepted and settings.takes_every_step:
+            return replace(self, iteration=iteration, last=outcome, status=Status.DIVERGED)
         if not outcome.accepted:
             damping = outcome.damping.rejected()
             suspected = damping.exhausted or (outcome.short and not self.doubted)
@@ -129,6 +131,8 @@ class Course:
     def _rested(self, damping: float, settings: ProjectionSettings, inexact: bool) -> Course:
         """Whether the merit has come to rest; if so, with an iterative linear solver also when that is tightened.
 
+        It rises in no step, unless every step is taken.
+
         Steps that heavy damping kept short say little, so more of them are waited for where no certificate is asked for
         that sees through them. A relative remainder changes the decrease of the merit by its square, hence the tightest
         one worth asking for.
@@ -137,7 +141,7 @@ class Course:
             return replace(self, suspicion=Status.GRADIENT_TOLERANCE)
         heavy = damping > settings.initial_damping and settings.when_settled != "go on"
         patience = settings.patience * (settings.patience_when_damped if heavy else 1)
-        if len(self.falls) < patience or max(self.falls[-patience:]) >= settings.merit_tolerance:
+        if len(self.falls) < patience or max(map(abs, self.falls[-patience:])) >= settings.merit_tolerance:
             return self
         if inexact and self.accuracy > tightest_accuracy(settings):
             return replace(self, accuracy=max(0.1 * self.accuracy, tightest_accuracy(settings)), falls=())

@@ -1,4 +1,4 @@
-"""The Levenberg-Marquardt parameter: how it follows the gain of each step (Nielsen 1999)."""
+"""The Levenberg-Marquardt parameter: how it follows the gain of each step (Nielsen 1999), or that it does not."""
 
 from __future__ import annotations
 
@@ -33,3 +33,16 @@ class Damping:
     def exhausted(self) -> bool:
         """Whether there is no larger value to try."""
         return self.value > LARGEST
+
+
+@dataclass(frozen=True)
+class ConstantDamping(Damping):
+    """Stays what it is after every step, the paper's ``w_reg``; rises only where the system is singular."""
+
+    def accepted(self, gain: float) -> ConstantDamping:
+        """Itself, whatever the step gained."""
+        return self
+
+    def rejected(self) -> ConstantDamping:
+        """After a singular system."""
+        return ConstantDamping(self.value * self.growth, 2.0 * self.growth)

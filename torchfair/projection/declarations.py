@@ -6,8 +6,9 @@ import torch
 from torch import Tensor
 
 from ..errors import TorchfairError
+from .differentiation import as_rows, differentiate
 from .element_function import checked
-from .term import ElementTerm, as_rows, differentiate
+from .term import ElementTerm
 
 _ELEMENTS = 8
 _TOLERANCE = {torch.float64: 1e-3, torch.float32: 5e-2}  # of the largest derivative of the same component
@@ -17,6 +18,8 @@ _MOVED = 1e-2  # of the size of an element
 def check_declarations(term: ElementTerm, arguments: tuple[Tensor, ...]) -> None:
     """Raises TorchfairError unless a closed form is the derivative and rows of a batched term stand for themselves.
 
+    Likewise where the residual does not depend on the unknowns, for which ``torch.func`` gives zeros without a word.
+
     Args:
         term: With at least one element.
         arguments: Of all its elements, at any state.
@@ -24,14 +27,17 @@ def check_declarations(term: ElementTerm, arguments: tuple[Tensor, ...]) -> None
     Raises:
         ShapeError: a closed form has the wrong shape.
     """
-    if not term.batched and term.jacobian is None:
+    transformed = term.derivatives in ("jacrev", "jacfwd")
+    if not term.batched and not term.has_closed_form and not transformed:
         return
     count = arguments[0].shape[0]
     chosen = torch.linspace(0, count - 1, min(count, _ELEMENTS), device=arguments[0].device).round().long()
     few = tuple(argument[chosen] for argument in arguments)
     if term.batched:
         _check_rows(term, _moved(term, few))
-    if term.jacobian is not None:
+    if transformed:
+        term.automatic_derivatives(few, "sums")
+    if term.has_closed_form:
         _check_derivative(term, few, chosen.tolist())
 
 
@@ -58,16 +64,16 @@ def _check_derivative(term: ElementTerm, arguments: tuple[Tensor, ...], elements
     """
     try:
         few = tuple(argument.double() if argument.is_floating_point() else argument for argument in arguments)
-        closed = term.derivatives(few)[1]
+        closed = term.linearised(few)[1]
     except TorchfairError:
         few = arguments
-        closed = term.derivatives(few)[1]
+        closed = term.linearised(few)[1]
     if not _mixture_differs(term, few, closed):
         return
     automatic = term.automatic_derivatives(few)[1]
     wrong = _differ(closed, automatic)
     moved = _moved(term, few)
-    bad = torch.nonzero(wrong & _differ(term.derivatives(moved)[1], term.automatic_derivatives(moved)[1]))
+    bad = torch.nonzero(wrong & _differ(term.linearised(moved)[1], term.automatic_derivatives(moved)[1]))
     if len(bad):
         element, component, unknown = bad[0].tolist()
         rates = [float(part[element, component, unknown]) for part in (automatic, closed)]

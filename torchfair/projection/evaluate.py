@@ -109,7 +109,7 @@ def culprit(structure: Structure, state: State) -> str:
     """The term that most likely makes the system singular: one that is not finite, or the stiffest."""
     sizes = []
     for term in structure.terms:
-        values, jacobians = term.derivatives(term.arguments(state))
+        values, jacobians = term.linearised(term.arguments(state))
         scaled = apply_root(term.roots(values), jacobians)
         sizes.append(float(torch.nan_to_num(scaled, nan=float("inf")).abs().max()))
     worst = max(range(len(sizes)), key=sizes.__getitem__)

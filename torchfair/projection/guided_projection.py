@@ -11,6 +11,7 @@ from .._shown import shown
 from .._threads import threads_for
 from ..errors import ShapeError
 from .batch import BatchRun
+from .differentiation import Way
 from .layout import State
 from .problem import Problem
 from .result import ProjectionResult
@@ -26,6 +27,7 @@ def guided_projection(
     *,
     fixed: Mapping[str, Tensor] | None = None,
     settings: ProjectionSettings | None = None,
+    derivatives: Way | None = None,
     callback: Callback | None = None,
     observe: Observe | None = None,
     guard: Guard | None = None,
@@ -34,7 +36,8 @@ def guided_projection(
 
     Each step solves ``(J^T J + damping * scale) d = -J^T r`` and is taken only if the merit, the sum of the
     true losses of all terms, falls. Constraints are terms with large weights, targets terms with small ones
-    (guided projection after Tang et al. 2014; paper section 5.1).
+    (guided projection after Tang et al. 2014; paper section 5.1). As printed there every step is taken, with constant
+    damping: ``ProjectionSettings(step_policy="every")``.
 
     The solve is not differentiated through: blocks and data that require gradients are detached, silently, and the
     result requires none.
@@ -44,14 +47,16 @@ def guided_projection(
         terms: What is to be small. See :class:`ElementTerm`.
         fixed: Masks ``(n,)`` or ``(n, d)`` by block name, True where an unknown stays as it is.
         settings: Tolerances, damping, linear solver.
+        derivatives: How all residuals are differentiated, by default what each term says; see :class:`ElementTerm`.
         callback: Called with every :class:`IterationRecord`, which then also holds the state; returning True stops
             the iteration.
         observe: Named quantities of a state to keep in the history.
         guard: ``guard(state, trial)`` refuses a trial state by returning False; the step then counts as
-            one that does not lower the merit.
+            one that does not lower the merit. Not asked where settings say that every step is taken.
 
     Returns:
-        The best state found. Interrupting (Ctrl-C) returns it too, with ``Status.INTERRUPTED``.
+        The best state found; where every step is taken (``step_policy``), the last one, which may be worse than the
+        start. Interrupting (Ctrl-C) returns it too, with ``Status.INTERRUPTED``.
 
     Raises:
         ShapeError: blocks, terms or masks do not fit together, or a function of a term returns something else
@@ -62,7 +67,7 @@ def guided_projection(
             linear term is not linear.
     """
     settings = ProjectionSettings.given(settings)
-    problem = GuidedProjection(blocks, terms, fixed=fixed, solver=settings.solver)
+    problem = GuidedProjection(blocks, terms, fixed=fixed, solver=settings.solver, derivatives=derivatives)
     return problem.solve(blocks, settings=settings, callback=callback, observe=observe, guard=guard)
 
 
@@ -71,7 +76,7 @@ class GuidedProjection(Problem):
 
     Args:
         blocks: Example blocks ``(n, d)``; only sizes, dtype and device matter.
-        terms, fixed: See :func:`guided_projection`.
+        terms, fixed, derivatives: See :func:`guided_projection`.
         solver: Name of a linear solver, or an object with that protocol.
     """
 

@@ -80,6 +80,37 @@ class SmoothAbsolute:
 
 
 @dataclass(frozen=True)
+class LogAbsolute:
+    r"""The absolute value as the paper reweights it: ``|r| - epsilon log(1 + |r| / epsilon)``.
+
+    Its quadratic model is that of paper section 5.3, ``r^2 / (|r_prev| + epsilon)``, half of it. Iterated reweighting
+    with these weights lowers this function (Fair 1974), which tends to ``|r|`` as epsilon goes to zero: less by
+    ``epsilon log(1 + |r| / epsilon)``, so more slowly than :class:`SmoothAbsolute`, which is less by at most epsilon.
+
+    Attributes:
+        epsilon: Above 0, in the unit of the residual.
+
+    Raises:
+        SettingsError: epsilon is not a finite number above 0.
+    """
+
+    epsilon: float
+
+    def __post_init__(self) -> None:
+        check_number("epsilon of LogAbsolute", self.epsilon, above=True, finite=True)
+
+    def value(self, residuals: Tensor) -> Tensor:
+        """``|r| - epsilon log(1 + |r| / epsilon)``, never below zero."""
+        sizes: Tensor = torch.linalg.vector_norm(residuals, dim=1)
+        return (sizes - self.epsilon * torch.log1p(sizes / self.epsilon)).clamp_min(0.0)
+
+    def root(self, residuals: Tensor) -> Tensor:
+        """``(|r| + epsilon)^(-1/2)``."""
+        sizes: Tensor = torch.linalg.vector_norm(residuals, dim=1)
+        return torch.rsqrt(sizes + self.epsilon)
+
+
+@dataclass(frozen=True)
 class OneSided:
     """``|max(r, 0)|^2 / 2``: every component is an inequality ``r <= 0``.
 

@@ -12,7 +12,8 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from ..linear import BlockByBlock, BlockDense, LinearSolver, SparseDirect, choose_solver
-from .checks import listed
+from .checks import check_way, listed
+from .differentiation import Way
 from .layout import Layout, State
 from .replicate import replicated
 from .system import Structure
@@ -31,6 +32,8 @@ class Problem:
         terms: What is to be small.
         fixed: Masks ``(n,)`` or ``(n, d)`` by block name, True where an unknown stays as it is.
         solver: Name of a linear solver, or an object with that protocol.
+        derivatives: How all residuals are differentiated, see :class:`ElementTerm`; ``"closed form"`` those that have
+            one. By default what each term says.
 
     Attributes:
         terms: All of them.
@@ -46,8 +49,11 @@ class Problem:
         *,
         fixed: Mapping[str, Tensor] | None = None,
         solver: str | LinearSolver = "auto",
+        derivatives: Way | None = None,
     ) -> None:
-        self.terms = listed(terms)
+        check_way("problem", derivatives)
+        self._derivatives = derivatives
+        self.terms = _differentiated(listed(terms), derivatives)
         self.layout = Layout.of(blocks)
         free = self.layout.free_mask({} if fixed is None else fixed, self.layout.device)
         with torch.no_grad():
@@ -79,7 +85,7 @@ class Problem:
         """
         result = copy.copy(self)
         result._others = {}
-        result.terms = listed(terms)
+        result.terms = _differentiated(listed(terms), self._derivatives)
         with torch.no_grad():
             result.structure = self.structure.with_terms(result.terms)
         if not result.structure.shares_pattern(self.structure):
@@ -136,6 +142,13 @@ class Problem:
     def prepare(self) -> None:
         """Symbolic analysis; costs nothing where it is known."""
         self.solver.prepare(self.structure)
+
+
+def _differentiated(terms: list[ElementTerm], way: Way | None) -> list[ElementTerm]:
+    """Terms that are differentiated in a way, as far as they can be."""
+    if way is None:
+        return terms
+    return [replace(term, derivatives=None if way == "closed form" else way) for term in terms]
 
 
 def _for_members(solver: LinearSolver, unknowns: Tensor) -> LinearSolver:

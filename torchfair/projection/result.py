@@ -24,14 +24,18 @@ class Status(enum.Enum):
     SETTLED = (
         "the merit no longer falls by more than merit_tolerance, but this was not found to be a minimum: not converged"
     )
-    MAX_ITERATIONS = "max_iterations reached: allow more iterations, or accept the result, which is the best found"
-    TIME_LIMIT = "time_limit reached: allow more time, or accept the result, which is the best found"
+    MAX_ITERATIONS = "max_iterations reached: allow more iterations, or accept the result"
+    TIME_LIMIT = "time_limit reached: allow more time, or accept the result"
     STALLED = (
         "not converged: no damped step lowers the merit although the gradient is not small; residuals are not smooth "
         "here, their derivatives wrong, or the guard refuses what would help"
     )
     INTERRUPTED = "interrupted: the result is the best state found until then"
     CALLBACK = "stopped by the callback: the result is the best state found until then"
+    DIVERGED = (
+        "diverged: a step led to residuals that are not finite; the result is the state before it. Where every step is "
+        "taken, raise initial_damping, or let steps be judged"
+    )
     SINGULAR = "the linear system stayed singular at the largest damping: check the term named below"
 
     @property
@@ -73,7 +77,8 @@ class IterationRecord:
 
     Attributes:
         iteration: Counted from 1; record 0 is the start.
-        merit: Merit of the best state after this iteration; never rises.
+        merit: Merit of the best state after this iteration; never rises, unless every step is taken: then that of the
+            last state, which stands for the best one everywhere here.
         damping: Levenberg-Marquardt parameter with which the step was made.
         gain: Actual decrease of the merit over the predicted one.
         step: Largest change of an unknown.
@@ -166,7 +171,7 @@ def message_of(status: Status, history: list[IterationRecord], detail: str = "")
     if history and status is not Status.ZERO_MERIT:
         gradient, fall = history[-1].gradient, 100.0 * _recent_fall(history)
         steps = min(sum(record.accepted for record in history) - 1, _RECENT)
-        parts.append(f"scaled gradient {gradient:.1e} (0 at a minimum), merit -{fall:.2g} % in the last {steps} steps")
+        parts.append(f"scaled gradient {gradient:.1e} (0 at a minimum), merit {-fall:+.2g} % in the last {steps} steps")
     return "; ".join(parts)
 
 

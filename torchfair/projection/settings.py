@@ -15,6 +15,7 @@ from ..settings import setting
 
 DampingScale = Literal["diagonal", "identity"]
 WhenSettled = Literal["go on", "judge", "stop"]
+StepPolicy = Literal["judged", "every"]
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,10 @@ class ProjectionSettings:
 
     Attributes:
         max_iterations: Bound on the damped steps of a run, rejected ones included.
+        step_policy: ``"judged"`` takes a step only if it lowers the merit, tries better ones, and lets the damping
+            follow what steps gain. ``"every"`` is guided projection as the paper prints it: every step is taken,
+            whatever becomes of the merit and of what guards would say, and the damping stays ``initial_damping``.
+            Nothing holds such a run back; where a step leads to what is not finite it ends, with ``Status.DIVERGED``.
         initial_damping: First Levenberg-Marquardt parameter, relative to the damping scale.
         damping_scale: ``"diagonal"`` damps each unknown in proportion to its stiffness (the largest diagonal entry of
             ``J^T J`` met so far, More 1978), which makes the iteration independent of the units of the unknowns;
@@ -54,6 +59,7 @@ class ProjectionSettings:
     """
 
     max_iterations: int = 100
+    step_policy: StepPolicy = "judged"
     initial_damping: float = 1e-3
     damping_scale: DampingScale = "diagonal"
     gradient_tolerance: float = 1e-12
@@ -77,7 +83,14 @@ class ProjectionSettings:
             raise SettingsError(f"settings must be ProjectionSettings(...) or None, got {shown(settings)}")
         return settings
 
+    @property
+    def takes_every_step(self) -> bool:
+        """Whether steps are taken without asking what becomes of the merit."""
+        return self.step_policy == "every"
+
     def __post_init__(self) -> None:
+        if self.step_policy not in get_args(StepPolicy):
+            raise SettingsError(f"step_policy must be 'judged' or 'every', got {self.step_policy!r}")
         if self.damping_scale not in get_args(DampingScale):
             raise SettingsError(f"damping_scale must be 'diagonal' or 'identity', got {self.damping_scale!r}")
         if self.when_settled not in get_args(WhenSettled):

@@ -17,7 +17,7 @@ def rows(bad: Tensor) -> list[int]:
 
 def first_bad_elements(term: ElementTerm, state: State) -> list[int]:
     """Elements whose residual or Jacobian is not finite."""
-    values, jacobians = term.derivatives(term.arguments(state))
+    values, jacobians = term.linearised(term.arguments(state))
     return rows(~torch.isfinite(torch.cat([values[:, :, None], jacobians], dim=2)))
 
 

@@ -17,7 +17,7 @@ from .candidates import try_candidates
 from .certificate import certified
 from .course import Course, Outcome, Standing
 from .damped_solution import propose
-from .damping import Damping
+from .damping import ConstantDamping, Damping
 from .evaluate import check_linearised, check_start
 from .inequalities import Inequalities
 from .layout import State
@@ -70,7 +70,7 @@ def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = 
     check_start(problem.structure, evaluation)
     linearised, standings = _linearise(problem, evaluation, settings)
     check_linearised(problem.structure, linearised.system)
-    damping = Damping(settings.initial_damping)
+    damping = (ConstantDamping if settings.takes_every_step else Damping)(settings.initial_damping)
     courses = [
         Course(
             standing,
@@ -142,7 +142,7 @@ def step(
     Args:
         problem: That of the state.
         state: Not modified.
-        guard: ``guard(blocks, trial)`` refuses a trial by returning False.
+        guard: ``guard(blocks, trial)`` refuses a trial by returning False; not asked where every step is taken.
 
     Returns:
         The next state, equal in its blocks to the last one if the step was not accepted, and what happened.

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from ..errors import ShapeError, TorchfairError
 from .checks import check_data, check_term
+from .differentiation import AutomaticWay, Way, as_rows, differentiate
 from .element_function import checked, mapped
 from .layout import Layout, State
 from .loss import Loss, Squares, apply_root, is_one_sided
@@ -50,6 +51,10 @@ class ElementTerm:
         jacobian: Closed form of the derivative of the residual, ``(m, k_1 d_1 + k_2 d_2 + ...)`` or, for a
             scalar residual, ``(k_1 d_1 + ...,)``; by default torch differentiates. At the first start it is compared
             with that at a few elements, in float64 where the functions allow it; one that differs is an error.
+        derivatives: How the residual is differentiated. ``"closed form"`` by :attr:`jacobian`; ``"sums"`` by reverse
+            mode through ``vmap(residual)``, once for each component, summed over the elements; ``"jacrev"`` and
+            ``"jacfwd"`` by ``torch.func`` under ``vmap``. They agree up to rounding. By default the fastest: the closed
+            form if there is one; sums; forward mode where an element has more components than unknowns.
         linear: The residual is affine in the state and has no refresh: differentiated only once.
         batched: :attr:`residual`, :attr:`merit` and :attr:`jacobian` take all n elements at once, ``(n, k, d)`` and
             data ``(n, ...)``, and return results with n rows: faster where closed forms are written for it. They work
@@ -66,6 +71,7 @@ class ElementTerm:
     refresh: Refresh | None = None
     merit: Residual | None = None
     jacobian: Residual | None = None
+    derivatives: Way | None = None
     linear: bool = False
     batched: bool = False
 
@@ -122,9 +128,14 @@ class ElementTerm:
         value = self.weight * own
         return value if self.element_weights is None else value * self.element_weights
 
-    def derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
+    @property
+    def has_closed_form(self) -> bool:
+        """Whether :attr:`jacobian` is there and not passed over."""
+        return self.jacobian is not None and self.derivatives in (None, "closed form")
+
+    def linearised(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
         """Residuals ``(n, m)`` and Jacobians ``(n, m, K)``, K unknowns of the stencil in order."""
-        if self.jacobian is None:
+        if not self.has_closed_form:
             return self.automatic_derivatives(arguments)
         values, closed = self.values(arguments), self.jacobians(arguments)
         if closed.shape[:2] != values.shape:
@@ -132,71 +143,24 @@ class ElementTerm:
             raise ShapeError(f"term '{self.name}', jacobian of an element", what, tuple(closed.shape[1:]))
         return values, closed
 
-    def automatic_derivatives(self, arguments: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
-        """The same by differentiating :attr:`residual`, also where there is a closed form."""
+    def automatic_derivatives(
+        self, arguments: tuple[Tensor, ...], way: AutomaticWay | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """The same by differentiating :attr:`residual`, also where there is a closed form.
+
+        Args:
+            arguments: Of all elements.
+            way: By default that of :attr:`derivatives`, or the fastest.
+        """
         if torch.is_inference_mode_enabled():
             raise TorchfairError(f"term '{self.name}' is differentiated, but not in inference mode: use torch.no_grad")
         function, what = checked(self, "residual"), f"the residual of term '{self.name}'"
-        return differentiate(function, arguments, len(self.stencil), batched=self.batched, what=what)
+        own = None if self.derivatives == "closed form" else self.derivatives
+        return differentiate(function, arguments, len(self.stencil), batched=self.batched, what=what, way=way or own)
 
     def jacobians(self, arguments: tuple[Tensor, ...]) -> Tensor:
         """Jacobians ``(n, m, K)``."""
-        if self.jacobian is None:
+        if not self.has_closed_form:
             return self.automatic_derivatives(arguments)[1]
         closed = mapped(self, "jacobian")(*arguments)
         return closed if closed.ndim == 3 else closed[:, None]
-
-
-def as_rows(values: Tensor) -> Tensor:
-    """``(n,)`` or ``(n, m)`` as ``(n, m)``."""
-    return values[:, None] if values.ndim == 1 else values
-
-
-def differentiate(
-    residual: Residual,
-    arguments: tuple[Tensor, ...],
-    count: int,
-    *,
-    batched: bool = False,
-    what: str = "the residual",
-) -> tuple[Tensor, Tensor]:
-    """Residuals ``(n, m)`` and Jacobians ``(n, m, K)`` with respect to the first ``count`` arguments.
-
-    Elements do not depend on each other, so the gradient of the sum of one component over all elements
-    holds that component's row of every element: reverse mode costs one sweep for each of the m components
-    (and needs none of the machinery that ``jacrev`` imports, which takes seconds).
-
-    Raises:
-        TorchfairError: the residual does not depend on the first arguments; named ``what``.
-    """
-    local = [a.detach().requires_grad_() for a in arguments[:count]]
-    with torch.enable_grad():
-        values = as_rows((residual if batched else torch.func.vmap(residual))(*local, *arguments[count:]))
-        if values.numel() and not values.requires_grad:
-            raise TorchfairError(
-                f"{what} does not depend on its unknowns in a way that torch can differentiate: leave out "
-                "detach(), comparisons and rounding, or the term"
-            )
-        totals = values.sum(0).unbind() if values.requires_grad else ()
-    outputs, inputs = values.shape[1], sum(a[0].numel() for a in local) if values.shape[0] else 0
-    if outputs > inputs > 0:
-        one = (lambda *inputs: residual(*(part[None] for part in inputs))[0]) if batched else residual
-        return values.detach(), _forward_jacobian(one, arguments, count)
-    rows = []
-    for total in totals:
-        gradients = torch.autograd.grad(total, local, retain_graph=True, materialize_grads=True)
-        rows.append(torch.cat([gradient.flatten(1) for gradient in gradients], dim=1))
-    values = values.detach()
-    if not rows:
-        return values, values.new_zeros(*values.shape, inputs)
-    return values, torch.stack(rows, dim=1)
-
-
-def _forward_jacobian(residual: Residual, arguments: tuple[Tensor, ...], count: int) -> Tensor:
-    """Jacobians by forward mode, for residuals with more components than unknowns."""
-
-    def flat(*inputs: Tensor) -> Tensor:
-        return residual(*inputs).reshape(-1)
-
-    blocks = torch.func.vmap(torch.func.jacfwd(flat, argnums=tuple(range(count))))(*arguments)
-    return torch.cat([block.flatten(2) for block in blocks], dim=2)

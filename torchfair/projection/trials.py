@@ -38,6 +38,7 @@ class Trials:
         gains: For each member, by how much the merit falls at the best candidate so far, over what was promised;
             minus infinity while there is none.
         merits: Its merit.
+        taken: Whether there is any.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class Trials:
         self._best, self._change = state.evaluation, torch.zeros_like(self._start)
         self.merits = [course.merit for course in state.courses]
         self.gains = [-math.inf for _ in state.courses]
+        self.taken = [False for _ in state.courses]
 
     def offer(self, change: Tensor, to: Sequence[bool] | None = None, *, again: bool = False) -> Evaluation | None:
         """Tries a step (N,); members for which it is the best so far take it.
@@ -91,10 +93,20 @@ class Trials:
         self._take(tried, takes, [rows[number] for number in takes])
         return whole
 
+    def take(self, change: Tensor) -> None:
+        """Takes a step (N,) without asking, for all members for which it leads to residuals that are finite."""
+        trial, promised = self._evaluate(change), self._promised
+        merits = trial.merits.tolist()
+        takes = [number for number in self._active if math.isfinite(merits[number])]
+        for number in takes:
+            fall = self._state.courses[number].merit - merits[number]
+            self.gains[number] = fall / promised[number] if promised[number] > 0.0 else -math.inf
+        self._take(_Tried(trial, change, range(len(merits)), merits, promised), takes, takes)
+
     def _take(self, tried: _Tried, takes: list[int], rows: list[int]) -> None:
         """The members that take what was tried, and their places in it."""
         for number, row in zip(takes, rows, strict=True):
-            self.merits[number] = tried.merits[row]
+            self.merits[number], self.taken[number] = tried.merits[row], True
         if len(takes) == len(self.merits):
             self._best, self._change = tried.trial, tried.change
         elif takes:
@@ -117,11 +129,6 @@ class Trials:
         tiny = self._proposal.predicted <= _ROUNDING * self._state.evaluation.merits
         sizes, nothing = torch.stack([layout.member_largest(change.abs()), (short | tiny).to(change)]).tolist()
         return sizes, [number > 0.0 for number in nothing]
-
-    @property
-    def taken(self) -> list[bool]:
-        """For each member, whether any candidate was good enough."""
-        return [merit < course.merit for merit, course in zip(self.merits, self._state.courses, strict=True)]
 
     def best(self) -> Evaluation | None:
         """The state in which every member has its best candidate; None if no member moves."""

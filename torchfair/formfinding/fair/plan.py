@@ -53,8 +53,10 @@ class FairPlan(Plan):
                 portions.append(Portion(share + _SHARE_STEP, 1.0))
 
     def planned(self) -> list[Portion]:
-        """All portions that are known beforehand."""
+        """All portions that are known beforehand; one where every step is taken."""
         settings = self._problem.settings
+        if settings.projection.takes_every_step:
+            return [Portion(1.0, 1.0)]
         blurs = settings.continuation if settings.formulation == "reduced" else ()
         *first, last = self._problem.shares(self.state["vertices"])
         bluntest = max(blurs, default=1.0)

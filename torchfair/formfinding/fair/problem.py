@@ -12,8 +12,6 @@ from torch import Tensor
 
 from ... import constraints as c
 from ...boundary import boundary_corners
-from ...constraints.closeness import TangentPlanes
-from ...constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
 from ...geometry import closest_on, corner_angles, face_areas, face_centres
 from ...geometry.planarity import planarity
 from ...geometry.reference import Reference
@@ -113,7 +111,7 @@ class FairProblem:
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""
-        self._planes = TangentPlanes(self.reference)
+        self._planes = c.TangentPlanes(self.reference)
 
     # ---- stages ----------------------------------------------------------------------------------------
 
@@ -157,7 +155,7 @@ class FairProblem:
             *self._energy(blur),
             *self._closeness(),
             *self._boundary(),
-            *c.interior_fairness_terms(self.topology, weight=settings.fairness_weight),
+            *self._fairness(),
             *self._quality(),
             *self.pulls.terms(weight=settings.handle_weight),
             *c.planarity_terms(self.topology, self.planar_faces, weight=planarity_weight),
@@ -172,7 +170,7 @@ class FairProblem:
         """Variable blocks at ``vertices``; auxiliary variables satisfy their constraints there."""
         if self.settings.formulation == "reduced":
             return {"vertices": vertices}
-        return {"vertices": vertices, **lifted_blocks(vertices, self.topology)}
+        return {"vertices": vertices, **c.lifted_normal_variation_blocks(vertices, self.topology)}
 
     # ---- decisions -------------------------------------------------------------------------------------
 
@@ -222,7 +220,7 @@ class FairProblem:
             return c.normal_variation_terms(self.topology, smoothing=smoothing, weight=settings.energy_weight)
         planar = self.topology.face_sizes == 3
         planar[self.planar_faces] = True
-        return lifted_normal_variation_terms(
+        return c.lifted_normal_variation_terms(
             self.vertices,
             self.topology,
             planar,
@@ -278,15 +276,21 @@ class FairProblem:
             return None
         return GlidingBoundary(self.vertices, self.topology, self.corners, self.pulls, self.planar_faces)
 
+    def _fairness(self) -> list[ElementTerm]:
+        weight = self.settings.fairness_weight
+        if self.settings.second_differences:
+            return c.polyline_fairness_terms(self.topology, weight=weight, corners=self.corners)
+        terms = c.interior_fairness_terms(self.topology, weight=weight)
+        if self.boundary is not None:
+            terms += c.boundary_fairness_terms(self.topology, self.corners, weight=weight)
+        return terms
+
     def _boundary(self) -> list[ElementTerm]:
-        if self.boundary is None:
+        if self.boundary is None or self.boundary.feet is None:
             return []
-        fairness = c.boundary_fairness_terms(self.topology, self.corners, weight=self.settings.fairness_weight)
-        if self.boundary.feet is None:
-            return fairness
         gliding = c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight)
         weights = self.boundary.glides.to(self.vertices)
-        return [*(replace(term, element_weights=weights) for term in gliding), *fairness]
+        return [replace(term, element_weights=weights) for term in gliding]
 
     def _quality(self) -> list[ElementTerm]:
         settings = self.settings

@@ -12,6 +12,7 @@ from ...errors import SettingsError
 from ...projection import ProjectionSettings
 from ...settings import setting
 from ..checks import check_choice, check_weights
+from ..printed import printed_projection
 
 Boundary = Literal["glide", "fixed", "free"]
 Planar = Literal["keep", "quads", "none"]
@@ -40,6 +41,8 @@ class FairSettings:
         distance_limit: No vertex goes farther from the reference surface than this, or on a boundary that glides
             from its curve, which bulges over the chords; None for no limit.
         fairness_weight: Weight of squared second differences and umbrella vectors.
+        second_differences: Whether fairness is that of second differences along all mesh polylines, the paper's, on
+            triangle meshes too.
         handle_weight: Weight of the squared distance of handles from their targets.
         boundary: ``"glide"`` lets boundary vertices slide on smooth curves through all of them and keeps corners,
             where curves end; ``"fixed"`` keeps them where they are, ``"free"`` leaves them to closeness alone. Between
@@ -66,6 +69,7 @@ class FairSettings:
     closeness_weight: float = 100.0
     distance_limit: float | None = setting(0.05, unit="mean edges")
     fairness_weight: float = 0.3
+    second_differences: bool = False
     handle_weight: float = 1e4
     boundary: Boundary = "glide"
     boundary_weight: float = 1e4
@@ -81,6 +85,49 @@ class FairSettings:
     formulation: Formulation = "reduced"
     constraint_weight: float = 1e5
     projection: ProjectionSettings = field(default_factory=_default_projection)
+
+    @classmethod
+    def paper(
+        cls,
+        *,
+        w_reg: float = 1e-6,
+        w_fair: float = 1.0,
+        w_target: float = 1e-6,
+        w_prox: float = 0.2,
+        w_handle: float = 1.0,
+        steps: int = 25,
+    ) -> FairSettings:
+        """Guided projection as printed (paper section 5.1), with the paper's weights of Fig. 18 by their names.
+
+        The paper's variables; ``w_reg |X - X_prev|^2`` with constant ``w_reg``; every step taken; plain second
+        differences; tangent planes of the reference and of the boundary; no barriers, limits, guards or stages. What
+        is promised is measured all the same. Constraints have weight 1. E enters as ``2 delta^2 mu^2``, which is
+        ``l l*`` where constraints hold; the paper's quadratic form ``l l*`` is indefinite.
+
+        Args:
+            w_reg: Of the squared change of the unknowns in a step.
+            w_fair: Of squared second differences.
+            w_target: Of E.
+            w_prox: Of squared distances from the reference and, of a boundary that glides, from its curves. All four as
+                in Fig. 20 of the paper; in mean edge lengths of the input, since the paper does not say its unit.
+            w_handle: Of handles, "appropriately weighted" in the paper.
+            steps: At most so many; "typically the shape stabilizes after 25 or so".
+        """
+        return cls(
+            energy_weight=0.5 * w_target,
+            closeness_weight=w_prox,
+            distance_limit=None,
+            fairness_weight=4.0 * w_fair,
+            second_differences=True,
+            handle_weight=w_handle,
+            boundary_weight=w_prox,
+            planarity_weight=0.0,
+            quality_weight=0.0,
+            continuation=(),
+            formulation="lifted",
+            constraint_weight=1.0,
+            projection=printed_projection(w_reg, steps),
+        )
 
     def __post_init__(self) -> None:
         check_choice(self, "boundary", get_args(Boundary))

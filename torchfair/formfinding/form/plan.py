@@ -38,7 +38,8 @@ class FormPlan(Plan):
         problem, settings = self._problem, self._problem.settings
         problem.pulls.aim(1.0, self._start)
         if settings.formulation == "lifted":
-            yield from self._in_space(settings.smoothings()[-1:] if self._nearby else settings.smoothings())
+            smoothings = list(dict.fromkeys(settings.smoothings()))  # coarse and fine may be the same
+            yield from self._in_space(smoothings[-1:] if self._nearby else smoothings)
         elif self._nearby:
             yield from self._from_nearby()
         else:

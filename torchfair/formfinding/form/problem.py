@@ -10,13 +10,12 @@ from torch import Tensor
 
 from ... import constraints as c
 from ..._graph import graph_laplacian
-from ...constraints.lifted_absolute_curvature import lifted_absolute_curvature_blocks, lifted_absolute_curvature_terms
 from ...energies import total_absolute_curvature
 from ...geometry import corner_angles, vertex_normals
 from ...geometry.spline_curves import SplineCurves
 from ...linear import Factor, factorise
 from ...normalisation import Normalisation
-from ...projection import ElementTerm
+from ...projection import ElementTerm, LogAbsolute, SmoothAbsolute
 from ...topology import Topology
 from ..job.pulls import Pulls
 from .boundary_track import BoundaryTrack
@@ -104,7 +103,7 @@ class FormProblem:
         """Variable blocks at ``vertices``."""
         if self.settings.formulation == "reduced":
             return {"vertices": vertices}
-        return {"vertices": vertices, **lifted_absolute_curvature_blocks(vertices, self.topology)}
+        return {"vertices": vertices, **c.lifted_absolute_curvature_blocks(vertices, self.topology)}
 
     def terms(self, vertices: Tensor, smoothing: float, fairness_weight: float | None = None) -> list[ElementTerm]:
         """Terms whose unknowns are the vertices, or those of the lifted formulation.
@@ -120,11 +119,12 @@ class FormProblem:
         others = [*self._others(vertices, fairness), *pulls, *self._spreading()]
         if settings.formulation == "reduced":
             return [*self._curvature(smoothing), *self._bending(smoothing), *others]
-        lifted = lifted_absolute_curvature_terms(
+        lifted = c.lifted_absolute_curvature_terms(
             self.topology,
             smoothing=smoothing,
             weight=settings.curvature_weight,
             constraint_weight=settings.constraint_weight,
+            absolute=LogAbsolute if settings.absolute_value == "logarithmic" else SmoothAbsolute,
         )
         return [*lifted, *others]
 

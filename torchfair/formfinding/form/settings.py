@@ -10,9 +10,11 @@ from ...errors import SettingsError
 from ...projection import ProjectionSettings
 from ...settings import setting
 from ..checks import check_choice, check_weights
+from ..printed import printed_projection
 
 Boundary = Literal["fixed", "glide"]
 Formulation = Literal["reduced", "lifted"]
+AbsoluteValue = Literal["smooth", "logarithmic"]
 
 
 def _default_projection() -> ProjectionSettings:
@@ -54,6 +56,9 @@ class FormSettings:
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables
             too (for comparison: slower).
         constraint_weight: Weight of the constraints that define auxiliary variables.
+        absolute_value: Of curvatures that are unknowns, those of the lifted formulation: ``"smooth"`` is reweighted by
+            the inverse of ``sqrt(x^2 + smoothing^2)``, ``"logarithmic"`` by that of ``|x| + smoothing``, as the paper
+            prints it.
         projection: Iterations of each stage, tolerances, damping and linear solver. The tolerance of the merit is
             that of stages in space; along normals ten times it while smoothing is coarse, a tenth of it at last.
     """
@@ -73,11 +78,54 @@ class FormSettings:
     least_angle: float = setting(math.radians(5.0), unit="radians")
     formulation: Formulation = "reduced"
     constraint_weight: float = 1e3
+    absolute_value: AbsoluteValue = "smooth"
     projection: ProjectionSettings = field(default_factory=_default_projection)
+
+    @classmethod
+    def paper(
+        cls,
+        *,
+        w_reg: float = 1e-3,
+        w_fair: float = 0.2,
+        w_target: float = 0.05,
+        w_handle: float = 1.0,
+        epsilon: float = 0.05,
+        steps: int = 18,
+    ) -> FormSettings:
+        """Guided projection as printed (paper section 5.3), with weights of Fig. 19 by their names.
+
+        The paper's variables; ``w_reg |X - X_prev|^2`` with constant ``w_reg``; every step taken; plain umbrella
+        vectors; absolute values by ``1 / (|x| + epsilon)``; no smoothing from coarse to fine, no guards, no stages
+        along normals. What is promised is measured all the same. Constraints have weight 1.
+
+        Args:
+            w_reg: Of the squared change of the unknowns in a step.
+            w_fair: Of squared umbrella vectors.
+            w_target: Of C. All three as in Fig. 19 of the paper; with unit mean edge length, since
+                the paper does not say its unit.
+            w_handle: Of handles.
+            epsilon: As a fraction of the mean absolute curvature of a star at the start; the paper does not say its.
+            steps: At most so many; the paper has 7 to 18.
+        """
+        return cls(
+            curvature_weight=w_target,
+            fairness_weight=0.0,
+            coarse_fairness_weight=0.0,
+            umbrella_weight=w_fair,
+            boundary_weight=1.0,
+            handle_weight=w_handle,
+            coarse_smoothing=epsilon,
+            smoothing=epsilon,
+            formulation="lifted",
+            constraint_weight=1.0,
+            absolute_value="logarithmic",
+            projection=printed_projection(w_reg, steps),
+        )
 
     def __post_init__(self) -> None:
         check_choice(self, "boundary", get_args(Boundary))
         check_choice(self, "formulation", get_args(Formulation))
+        check_choice(self, "absolute_value", get_args(AbsoluteValue))
         check_weights(self)
         if not 0.0 < self.smoothing <= self.coarse_smoothing < math.inf:
             raise SettingsError(

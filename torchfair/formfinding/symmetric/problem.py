@@ -11,10 +11,6 @@ import torch
 from torch import Tensor
 
 from ... import constraints as c
-from ...constraints.closeness import TangentPlanes
-from ...constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
-from ...constraints.lifted_principal_symmetric import lifted_blocks, lifted_principal_symmetric_terms
-from ...constraints.principal_symmetric import between_stars, sphere_blocks
 from ...constraints.saddle_sides import SaddleSides
 from ...geometry import corner_angles
 from ...geometry.reference import Reference
@@ -69,7 +65,7 @@ class SymmetricProblem:
     ) -> None:
         self.base, self.principal, self.stars, self.settings = base, principal, stars, settings
         self.topology, self.stays, self.pulls = principal.topology, stays, pulls
-        self.edges = between_stars(self.topology.edges[principal.mask], stars)
+        self.edges = c.between_stars(self.topology.edges[principal.mask], stars)
         self.sides = SaddleSides(stars, margin=settings.saddle_margin)
         self._reference = reference
         self.forget()
@@ -93,7 +89,7 @@ class SymmetricProblem:
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""
-        self._planes = None if self._reference is None else TangentPlanes(self._reference)
+        self._planes = None if self._reference is None else c.TangentPlanes(self._reference)
         self._kept: dict[tuple[object, SymmetricSettings], list[ElementTerm]] = {}
 
     # ---- stages ----------------------------------------------------------------------------------------
@@ -101,10 +97,21 @@ class SymmetricProblem:
     def blocks(self, vertices: Tensor) -> State:
         """Variable blocks that fit ``vertices``."""
         if self.settings.formulation == "spheres":
-            return {"vertices": vertices, **sphere_blocks(vertices, self.stars)}
+            return {"vertices": vertices, **c.sphere_blocks(vertices, self.stars)}
         if self.settings.formulation == "lifted":
-            return {"vertices": vertices, **lifted_blocks(vertices, self.edges, self.stars)}
+            lifted = c.lifted_principal_symmetric_blocks(vertices, self.edges, self.stars)
+            return self._with_energy({"vertices": vertices, **lifted})
         return {"vertices": vertices}
+
+    def _with_energy(self, state: State) -> State:
+        """With the paper's variables of E that fit the vertices, where E is lowered in these."""
+        if not self._lifts_energy:
+            return state
+        return {**state, **c.lifted_normal_variation_blocks(state["vertices"], self.topology)}
+
+    @property
+    def _lifts_energy(self) -> bool:
+        return self.settings.formulation == "lifted" and self.settings.energy_weight > 0.0
 
     def stage(self, state: State, aim: Aim, settings: ProjectionSettings) -> Stage:
         """A run of guided projection from ``state`` on.
@@ -121,6 +128,7 @@ class SymmetricProblem:
             settings=replace(settings, solver=self.settings.projection.solver),
             fixed={"vertices": self.stays | self.pulls.held},
             guard=self.admits,
+            result=self._with_energy,
             anew=self.settings.formulation == "lifted",
         )
 
@@ -135,7 +143,8 @@ class SymmetricProblem:
             return conditions
         if aim is Aim.EXACT:
             return [*conditions, *self._sides(share=_KEPT_MARGIN)]
-        return [*conditions, *self._sides(ahead=aim is not Aim.SEARCH), *self._same("others", self._others)]
+        others = [*self._energy(weight), *self._same("others", self._others)]
+        return [*conditions, *self._sides(ahead=aim is not Aim.SEARCH), *others]
 
     def _same(self, name: object, make: Callable[[], list[ElementTerm]]) -> list[ElementTerm]:
         """Terms that are the very same for all aims: what is known of them is not found again."""
@@ -152,20 +161,25 @@ class SymmetricProblem:
     def _others(self) -> list[ElementTerm]:
         settings, everywhere = self.settings, torch.arange(self.topology.num_vertices)
         return [
-            *c.displacement_fairness_terms(self.base, self.topology, weight=settings.fairness_weight),
+            *self._fairness(),
             *c.even_star_terms(self.stars, weight=settings.evenness_weight),
             *c.handle_terms(everywhere, self.base, weight=settings.anchor_weight, name="anchors"),
             *self.pulls.refreshed_terms(weight=settings.handle_weight),
             *self._closeness(),
-            *self._energy(),
             *self._quality(),
         ]
 
+    def _fairness(self) -> list[ElementTerm]:
+        weight = self.settings.fairness_weight
+        if self.settings.second_differences:
+            return c.polyline_fairness_terms(self.topology, weight=weight)
+        return c.displacement_fairness_terms(self.base, self.topology, weight=weight)
+
     def _conditions(self, weight: float) -> list[ElementTerm]:
         if self.settings.formulation == "eliminated":
-            return eliminated_principal_symmetric_terms(self.edges, self.stars, weight=weight)
+            return c.eliminated_principal_symmetric_terms(self.edges, self.stars, weight=weight)
         if self.settings.formulation == "lifted":
-            return lifted_principal_symmetric_terms(self.edges, self.stars, self.sides.is_saddle, weight=weight)
+            return c.lifted_principal_symmetric_terms(self.edges, self.stars, self.sides.is_saddle, weight=weight)
         return [
             *c.cospherical_terms(self.stars, weight=weight),
             *c.coplanar_terms(self.edges, self.stars, weight=weight),
@@ -177,10 +191,15 @@ class SymmetricProblem:
         every = torch.arange(self.topology.num_vertices)
         return c.closeness_terms(self._planes, every, weight=self.settings.closeness_weight)
 
-    def _energy(self) -> list[ElementTerm]:
+    def _energy(self, constraint_weight: float) -> list[ElementTerm]:
         settings = self.settings
         if not settings.energy_weight:
             return []
+        if self._lifts_energy:
+            planar = torch.ones(self.topology.num_faces, dtype=torch.bool)
+            return c.lifted_normal_variation_terms(
+                self.base, self.topology, planar, weight=settings.energy_weight, constraint_weight=constraint_weight
+            )
         return c.normal_variation_terms(
             self.topology, smoothing=settings.energy_smoothing, weight=settings.energy_weight
         )

@@ -14,7 +14,7 @@ from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
-from ..job import JobResult, Level, Promise, Recipe, Stage, solved
+from ..job import JobResult, Level, OneStage, Plan, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference, surface_of
 from .measures import symmetric_measures
 from .plan import SettlingPlan, SymmetricPlan
@@ -90,8 +90,14 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
 
     # ---- what is solved --------------------------------------------------------------------------------
 
-    def plan(self, state: State) -> SymmetricPlan:
-        """Rounds until conditions and saddle sides are right."""
+    def plan(self, state: State) -> Plan:
+        """Rounds until conditions and saddle sides are right; without rounds one run of everything weighted."""
+        if not self.settings.rounds:
+            self.problem.pull_fully()
+            self.problem.sides.decide(state["vertices"])
+            return OneStage(
+                self.problem.stage(self.problem.blocks(state["vertices"]), Aim.SHAPE, self.settings.projection)
+            )
         return SymmetricPlan(self.problem, state, self.rounds or self.settings.rounds)
 
     def follower(self, state: State) -> Stage:
@@ -104,8 +110,10 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
         settings = replace(self.settings.projection, least_extrapolation=math.inf)
         return self.problem.stage(state, Aim.SHAPE, settings)
 
-    def settling(self, state: State, damping: float | None) -> SettlingPlan:
+    def settling(self, state: State, damping: float | None) -> Plan:
         """Conditions and saddle sides to rounding, from the shape on; if that fails, the whole job."""
+        if not self.settings.rounds:
+            return super().settling(state, damping)
         return SettlingPlan(self.problem, state, self.rounds or self.settings.rounds, damping)
 
     def state(self) -> State:

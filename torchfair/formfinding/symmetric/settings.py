@@ -10,6 +10,7 @@ from ..._numbers import check_count, check_number
 from ...projection import ProjectionSettings
 from ...settings import setting
 from ..checks import check_choice, check_weights
+from ..printed import printed_projection
 
 Boundary = Literal["free", "fixed"]
 Formulation = Literal["spheres", "eliminated", "lifted"]
@@ -36,6 +37,8 @@ class SymmetricSettings:
         tight_weight: Their weight once it is found; at last they are met exactly, without any other aim.
         fairness_weight: Weight of squared umbrella vectors of the displacement from the start of the level: handles
             pull their surroundings along.
+        second_differences: Whether fairness is that of plain second differences along all mesh polylines, the paper's,
+            which shrink and straighten shapes; not of the displacement.
         evenness_weight: Weight of stars being symmetric along their principal polyline, which undoes shear; 3 for
             principal quads cut by diagonals.
         anchor_weight: Weight of the squared displacement itself: how far around a handle the mesh follows, about the
@@ -51,7 +54,8 @@ class SymmetricSettings:
         tolerance: Largest relative residual of the conditions at which they count as met.
         most_steps: Damped steps that one level may take at most.
         rounds: How often a shape is looked for at most: with handles pulling less each time if the conditions could
-            not be met, with wider margins if just some saddle sides came out wrong.
+            not be met, with wider margins if just some saddle sides came out wrong. 0 for a single run with everything
+            weighted, as the paper has it.
         formulation: ``"spheres"`` has normals and curvatures of the stars' spheres as unknowns beside the vertices,
             ``"eliminated"`` the vertices alone, ``"lifted"`` the paper's variables.
         projection: Damping, tolerances and linear solver while the shape is found.
@@ -60,6 +64,7 @@ class SymmetricSettings:
     constraint_weight: float = 1e2
     tight_weight: float = 1e4
     fairness_weight: float = 1.0
+    second_differences: bool = False
     evenness_weight: float = 0.0
     anchor_weight: float = 1e-5
     handle_weight: float = 1e2
@@ -76,11 +81,52 @@ class SymmetricSettings:
     formulation: Formulation = "spheres"
     projection: ProjectionSettings = field(default_factory=_default_projection)
 
+    @classmethod
+    def paper(
+        cls,
+        *,
+        w_reg: float = 1e-6,
+        w_fair: float = 1.0,
+        w_target: float = 0.0,
+        w_prox: float = 0.2,
+        w_handle: float = 1.0,
+        steps: int = 25,
+    ) -> SymmetricSettings:
+        """Guided projection as printed (paper section 5.2), with the paper's weights of Figs. 5 and 14 by their names.
+
+        The paper's variables, those of E among them if ``w_target`` is not 0; ``w_reg |X - X_prev|^2`` with constant
+        ``w_reg``; every step taken; plain second differences; saddle sides by slacks; one run of all that, no rounds,
+        no barriers, no guards. What is promised is measured all the same. Constraints have weight 1.
+
+        Args:
+            w_reg: Of the squared change of the unknowns in a step.
+            w_fair: Of squared second differences.
+            w_target: Of E; in Fig. 20 of the paper 1e-9 for Fig. 14 and 1e-6 for Fig. 5.
+            w_prox: Of squared distances from the reference, if there is one. All four in mean edge lengths of the
+                input, since the paper does not say its unit.
+            w_handle: Of handles, "appropriately weighted" in the paper.
+            steps: At most so many; "typically the shape stabilizes after 25 or so".
+        """
+        return cls(
+            constraint_weight=1.0,
+            fairness_weight=4.0 * w_fair,
+            second_differences=True,
+            anchor_weight=0.0,
+            handle_weight=w_handle,
+            closeness_weight=w_prox,
+            energy_weight=0.5 * w_target,
+            saddle_weight=0.0,
+            smallest_angle=0.0,
+            rounds=0,
+            formulation="lifted",
+            projection=printed_projection(w_reg, steps),
+        )
+
     def __post_init__(self) -> None:
         check_choice(self, "boundary", get_args(Boundary))
         check_choice(self, "formulation", get_args(Formulation))
         check_weights(self)
         for name in ("constraint_weight", "tight_weight"):
             check_number(name, getattr(self, name), above=True)
-        for name in ("most_steps", "rounds"):
-            check_count(name, getattr(self, name), least=1)
+        check_count("most_steps", self.most_steps, least=1)
+        check_count("rounds", self.rounds, least=0)
