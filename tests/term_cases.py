@@ -17,7 +17,11 @@ from torchfair.boundary import boundary_corners, boundary_pieces
 from torchfair.constraints import lifted_absolute_curvature as lifted_c
 from torchfair.constraints.closeness import TangentPlanes
 from torchfair.constraints.eliminated_principal_symmetric import eliminated_principal_symmetric_terms
-from torchfair.constraints.lifted_normal_variation import lifted_blocks, lifted_normal_variation_terms
+from torchfair.constraints.lifted_normal_variation import (
+    lifted_blocks,
+    lifted_flat_edge_terms,
+    lifted_normal_variation_terms,
+)
 from torchfair.constraints.lifted_principal_symmetric import lifted_blocks as lifted_spheres
 from torchfair.constraints.lifted_principal_symmetric import lifted_principal_symmetric_terms
 from torchfair.geometry import corner_angles, face_areas, vertex_normals
@@ -205,6 +209,14 @@ def _(vertices: Tensor, topology: Topology) -> Case:
     planar = topology.face_sizes == 3
     terms = lifted_normal_variation_terms(vertices, topology, planar, weight=0.5, constraint_weight=10.0)
     return {"vertices": moved(vertices), **lifted_blocks(vertices, topology)}, terms
+
+
+@case("lifted_flat_edge_terms", triangles, mixed)
+def _(vertices: Tensor, topology: Topology) -> Case:
+    chosen = torch.arange(0, topology.num_interior_edges, 2, device=vertices.device)
+    return {"vertices": moved(vertices), **lifted_blocks(vertices, topology)}, lifted_flat_edge_terms(
+        topology, chosen, weight=2.0
+    )
 
 
 @case("lifted_principal_symmetric_terms", lattice)
