@@ -200,6 +200,15 @@ def _(vertices: Tensor, topology: Topology) -> Case:
     return {"vertices": moved(vertices), **c.lifted_normal_variation_blocks(vertices, topology)}, terms
 
 
+@case("lifted_flat_edge_terms", triangles, mixed)
+def _(vertices: Tensor, topology: Topology) -> Case:
+    chosen = torch.arange(0, topology.num_interior_edges, 2, device=vertices.device)
+    return {
+        "vertices": moved(vertices),
+        **c.lifted_normal_variation_blocks(vertices, topology),
+    }, c.lifted_flat_edge_terms(topology, chosen, weight=2.0)
+
+
 @case("lifted_principal_symmetric_terms", lattice)
 def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars) -> Case:
     is_saddle = torch.ones_like(stars.vertices, dtype=torch.bool)

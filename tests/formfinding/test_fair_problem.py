@@ -97,7 +97,9 @@ def test_auxiliary_variables_fit_their_constraints_at_every_start_of_a_stage() -
     for place in (vertices, moved_on):
         blocks = fair.blocks(place)
         assert torch.equal(blocks["vertices"], place)
-        for term in lifted[:-1]:  # the last one is E
+        for term in lifted:
+            if term.name in ("normal variation", "flat edges"):  # what is asked for
+                continue
             assert float(term.values(term.arguments(blocks)).abs().max()) < 1e-12
 
 

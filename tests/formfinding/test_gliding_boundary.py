@@ -178,8 +178,9 @@ def sheet(n: int = 6) -> tuple[Tensor, Topology]:
 
 
 def test_corners_stay_and_sides_end_there() -> None:
+    """On the curves exactly, where no panel is to stay flat: its triangles are halves of planar quads."""
     vertices, topology = sheet()
-    result = minimise_normal_variation(vertices, topology)
+    result = minimise_normal_variation(vertices, topology, settings=FairSettings(flat="none"))
     corners = torch.tensor([0, 5, 30, 35])
     assert torch.equal(result.vertices[corners], vertices[corners])
     assert float(rim_distances(vertices, topology, result.vertices).max()) < 1e-12

@@ -41,6 +41,7 @@ from .handles import Handles as Handles
 from .handles import handle_terms as handle_terms
 from .lifted_absolute_curvature import lifted_absolute_curvature_blocks as lifted_absolute_curvature_blocks
 from .lifted_absolute_curvature import lifted_absolute_curvature_terms as lifted_absolute_curvature_terms
+from .lifted_normal_variation import lifted_flat_edge_terms as lifted_flat_edge_terms
 from .lifted_normal_variation import lifted_normal_variation_blocks as lifted_normal_variation_blocks
 from .lifted_normal_variation import lifted_normal_variation_terms as lifted_normal_variation_terms
 from .lifted_principal_symmetric import lifted_principal_symmetric_blocks as lifted_principal_symmetric_blocks

@@ -63,6 +63,28 @@ def energy_residual(s: Tensor) -> Tensor:
     return math.sqrt(2.0) * s[0, 2] * s[0, 3]
 
 
+def flat_residual(n: Tensor, s: Tensor) -> Tensor:
+    """``l*`` and ``n' - n``."""
+    return torch.cat([s[0, 1:2], n[1] - n[0]])
+
+
+def lifted_flat_edge_terms(topology: Topology, edges: Tensor, *, weight: float) -> list[ElementTerm]:
+    """``l* = 0`` for interior edges: "quads are kept planar via l* = 0 for all diagonals" (paper, Fig. 18).
+
+    Normals are set equal as well: the derivative of ``|n - n'|^2 - l*^2`` vanishes where ``l* = 0`` asks them to be, so
+    by that alone a residual of size r leaves an angle of ``sqrt(r)``.
+
+    Args:
+        topology: Any polygon mesh.
+        edges: (n,) numbers of interior edges.
+        weight: Dimensionless.
+    """
+    if not edges.numel():
+        return []
+    where = [("normals", topology.interior_edge_faces[edges]), ("lengths", edges[:, None])]
+    return [ElementTerm("flat edges", flat_residual, where, weight=weight, linear=True)]
+
+
 def lifted_normal_variation_terms(
     vertices: Tensor, topology: Topology, planar: Tensor, *, weight: float, constraint_weight: float
 ) -> list[ElementTerm]:

@@ -74,7 +74,7 @@ _TINY = 256  # rounding units by which normals are damped that are nearly in one
 def _directions_and_misfits(given: Tensor, topology: Topology) -> tuple[Tensor, Tensor, Tensor]:
     """Directions (*batch, V, 3), ``n . x - 1`` at corners (*batch, C), faces that count (*batch, V), in float64.
 
-    The sum s of k normals gives ``k s / |s|^2``: the answer for up to two faces and on regular cones. Elsewhere what that
+    The sum s of k normals gives ``k s / |s|^2``: the answer for up to two faces and on regular cones. Elsewhere what it
     lacks is sought, so that nothing is lost where all normals are nearly the same.
     """
     topology.check_vertices(given)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .problem import FairProblem
 
 PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
+FLAT_PROMISE = 0.02  # degrees between the faces at edges that are kept flat
 
 
 def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: Normalisation) -> dict[str, float]:
@@ -33,7 +34,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         ``largest_boundary_distance`` of gliding vertices from their curve. ``smallest_angle_degrees``;
         ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces`` against the start. ``largest_planarity``
         of the faces kept planar and ``largest_planarity_of_all`` polygons (diagonal distance over mean edge of the
-        face). ``largest_handle_distance``.
+        face). ``largest_fold_degrees`` of the edges kept flat. ``largest_handle_distance``.
     """
     topology = problem.topology
     normalised = unit.apply(vertices)
@@ -64,6 +65,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "flipped_faces": int((turned <= 0.0).sum()),
         "largest_planarity": _largest(warps[problem.planar_faces]),
         "largest_planarity_of_all": _largest(warps[topology.face_sizes > 3]),
+        "largest_fold_degrees": math.degrees(_largest(problem.folds(vertices))),
         "largest_handle_distance": unit.length * _largest(problem.pulls.away(normalised)),
     }
 
@@ -90,6 +92,10 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
     if problem.planar_faces.numel() and settings.planarity_weight:
         remedy = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"
         promises.append(Promise("planarity of kept faces", PLANAR_PROMISE, after["largest_planarity"], remedy=remedy))
+    if problem.flat_edges.numel() and settings.flat_weight:
+        remedy = "let the boundary glide or be free, raise distance_limit, or let them fold: flat none"
+        reached = after["largest_fold_degrees"]
+        promises.append(Promise("folds of edges kept flat", FLAT_PROMISE, reached, unit="degrees", remedy=remedy))
     if bool(problem.pulls.pulled.any()):
         away, edge = after["largest_handle_distance"], before["mean_edge_length"]
         remedy = "faces would become too small or too thin; allow smaller angles and areas, or pull less"

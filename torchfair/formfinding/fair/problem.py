@@ -12,7 +12,7 @@ from torch import Tensor
 
 from ... import constraints as c
 from ...boundary import boundary_corners
-from ...geometry import closest_on, corner_angles, face_areas, face_centres
+from ...geometry import closest_on, corner_angles, dihedral_angles, face_areas, face_centres
 from ...geometry.planarity import planarity
 from ...geometry.reference import Reference
 from ...projection import ElementTerm, ProjectionSettings
@@ -21,6 +21,7 @@ from ...topology import Topology
 from ..job.plan import Stage
 from ..job.pulls import Pulls
 from ..references import GivenReference, distances_from, surface_of
+from .flat_edges import edges_to_keep_flat
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .planar_faces import faces_to_keep_planar
@@ -32,6 +33,8 @@ _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _LARGEST_WARP = 1e-2  # relative planarity above which planarity is imposed in stages
 _PLANARITY_STAGES = 8
 _PLANAR_ENOUGH = 5e-5
+_LARGEST_FOLD = math.radians(2.0)  # of edges kept flat, above which that is imposed in stages
+_FLAT_ENOUGH = math.radians(0.01)
 _MOST_STAGES = 20
 _NO_LIMIT = 1e9  # mean edge lengths
 _ROUNDING = 1.0 + 1e-9  # of distances at the start
@@ -56,6 +59,7 @@ class FairProblem:
         allowed: (V,) the same as they are now: none in design mode, more than ``limits`` on the way back from it.
         design_mode: Whether a handle is pulled off the reference surface, which is then given up.
         planar_faces: (n,) faces that are kept planar.
+        flat_edges: (n,) interior edges that are kept flat.
         boundary: Curves on which boundary vertices glide; None if they do not.
         notes: Decisions taken, in words.
     """
@@ -76,6 +80,7 @@ class FairProblem:
         self.design_mode = self.has_other_goals = False
         self.corners = boundary_corners(vertices, topology, settings.corner_angle)
         self.planar_faces = self._planar_faces()
+        self.flat_edges = self._flat_edges()
         self.boundary = self._gliding_boundary()
         self.limits = self.allowed = self._limits()
 
@@ -136,7 +141,9 @@ class FairProblem:
         pulled = self.pulls.away(vertices)
         steps = math.ceil(float(pulled.max()) / _LONGEST_PULL) if pulled.numel() else 1
         warped = planarity(vertices, self.topology)[self.planar_faces]
-        if warped.numel() and float(warped.max()) > _LARGEST_WARP:
+        folds = self.folds(vertices)
+        warps = warped.numel() and float(warped.max()) > _LARGEST_WARP
+        if warps or (folds.numel() and float(folds.max()) > _LARGEST_FOLD):
             steps = max(steps, _PLANARITY_STAGES)
         steps = max(1, min(steps, _MOST_STAGES))
         self.has_other_goals = self.has_other_goals or steps > 1
@@ -150,7 +157,6 @@ class FairProblem:
             blur: Factor of the smoothing of the absolute value.
         """
         settings = self.settings
-        planarity_weight = max(settings.planarity_weight, 1.0) ** share if settings.planarity_weight else 0.0
         return [
             *self._energy(blur),
             *self._closeness(),
@@ -158,13 +164,23 @@ class FairProblem:
             *self._fairness(),
             *self._quality(),
             *self.pulls.terms(weight=settings.handle_weight),
-            *c.planarity_terms(self.topology, self.planar_faces, weight=planarity_weight),
+            *c.planarity_terms(self.topology, self.planar_faces, weight=_raised(settings.planarity_weight, share)),
+            *self._flat(share),
         ]
 
     def is_planar(self, vertices: Tensor) -> bool:
-        """Whether the faces kept planar are well within the tolerance that the job promises."""
+        """Whether faces kept planar and edges kept flat are well within the tolerances that the job promises."""
         warped = planarity(vertices, self.topology)[self.planar_faces]
-        return not self.settings.planarity_weight or not bool((warped > _PLANAR_ENOUGH).any())
+        settings, folded = self.settings, self.folds(vertices)
+        if settings.planarity_weight and bool((warped > _PLANAR_ENOUGH).any()):
+            return False
+        return not settings.flat_weight or not bool((folded > _FLAT_ENOUGH).any())
+
+    def folds(self, vertices: Tensor) -> Tensor:
+        """(n,) angles between the normals at the edges kept flat, radians."""
+        if not self.flat_edges.numel():
+            return vertices.new_zeros(0)
+        return dihedral_angles(vertices, self.topology)[self.flat_edges].abs()
 
     def blocks(self, vertices: Tensor) -> dict[str, Tensor]:
         """Variable blocks at ``vertices``; auxiliary variables satisfy their constraints there."""
@@ -211,6 +227,12 @@ class FairProblem:
             self.notes.append(f"{faces.numel()} of {self.topology.num_faces} faces are kept planar")
         return faces
 
+    def _flat_edges(self) -> Tensor:
+        edges = edges_to_keep_flat(self.vertices, self.topology, self.settings)
+        if edges.numel() and isinstance(self.settings.flat, str):
+            self.notes.append(f"{edges.numel()} edges between coplanar triangles are kept flat")
+        return edges
+
     # ---- terms -----------------------------------------------------------------------------------------
 
     def _energy(self, blur: float) -> list[ElementTerm]:
@@ -227,6 +249,13 @@ class FairProblem:
             weight=settings.energy_weight,
             constraint_weight=settings.constraint_weight,
         )
+
+    def _flat(self, share: float) -> list[ElementTerm]:
+        """By ``l* = 0`` where dual lengths are unknowns, as in the paper."""
+        weight = _raised(self.settings.flat_weight, share)
+        if self.settings.formulation == "lifted":
+            return c.lifted_flat_edge_terms(self.topology, self.flat_edges, weight=weight)
+        return c.flat_edge_terms(self.topology, self.flat_edges, weight=weight)
 
     def _closeness(self) -> list[ElementTerm]:
         settings, used = self.settings, self.topology.valences > 0
@@ -274,7 +303,9 @@ class FairProblem:
     def _gliding_boundary(self) -> GlidingBoundary | None:
         if self.settings.boundary != "glide":
             return None
-        return GlidingBoundary(self.vertices, self.topology, self.corners, self.pulls, self.planar_faces)
+        beside = self.topology.interior_edge_faces[self.flat_edges].reshape(-1)
+        panels = torch.cat([self.planar_faces, beside])
+        return GlidingBoundary(self.vertices, self.topology, self.corners, self.pulls, panels)
 
     def _fairness(self) -> list[ElementTerm]:
         weight = self.settings.fairness_weight
@@ -338,3 +369,8 @@ class FairProblem:
             smallest_area=bounded * self.settings.smallest_area,
             from_last=self.design_mode or self.pulls.everywhere,
         )
+
+
+def _raised(weight: float, share: float) -> float:
+    """A weight that is imposed by powers of ten, of which all of it has share 1."""
+    return max(weight, 1.0) ** share if weight else 0.0

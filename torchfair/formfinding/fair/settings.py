@@ -16,6 +16,7 @@ from ..printed import printed_projection
 
 Boundary = Literal["glide", "fixed", "free"]
 Planar = Literal["keep", "quads", "none"]
+Flat = Literal["keep", "all", "none"]
 Formulation = Literal["reduced", "lifted"]
 
 
@@ -55,6 +56,11 @@ class FairSettings:
         planar_tolerance: A polygon arrives planar when its diagonals are nearer than this fraction of its
             mean edge length.
         planarity_weight: Weight of the squared distance of diagonals.
+        flat: Edges that stay flat: ``"keep"`` for the diagonals of panels that arrive as coplanar triangles, ``"all"``
+            for all edges between triangles that arrive flat, ``"none"``, or numbers of interior edges. Coplanar
+            triangles are a panel if no vertex lies among them, and more than they hang together.
+        flat_tolerance: An edge arrives flat when its angle is at most this fraction of the mean angle of all edges.
+        flat_weight: Weight of squared ``l l*`` of edges kept flat; where they are not flat enough it is raised.
         smallest_angle: No corner angle falls below this (or below the smallest of the input), radians.
         smallest_area: No face falls below this fraction of its area.
         quality_weight: Weight of the barriers before those bounds.
@@ -77,6 +83,9 @@ class FairSettings:
     planar: Planar | tuple[int, ...] = "keep"
     planar_tolerance: float = 1e-3
     planarity_weight: float = 1e6
+    flat: Flat | tuple[int, ...] = "keep"
+    flat_tolerance: float = 1e-2
+    flat_weight: float = 1e4
     smallest_angle: float = setting(math.radians(10.0), unit="radians")
     smallest_area: float = 0.2
     quality_weight: float = 0.1
@@ -122,6 +131,7 @@ class FairSettings:
             handle_weight=w_handle,
             boundary_weight=w_prox,
             planarity_weight=0.0,
+            flat="none",
             quality_weight=0.0,
             continuation=(),
             formulation="lifted",
@@ -137,7 +147,9 @@ class FairSettings:
             raise SettingsError(
                 f"planar must be one of {', '.join(get_args(Planar))} or face numbers, got {self.planar!r}"
             )
-        for name in ("smallest_angle", "smallest_area", "planar_tolerance", "corner_angle"):
+        if isinstance(self.flat, str) and self.flat not in get_args(Flat):
+            raise SettingsError(f"flat must be one of {', '.join(get_args(Flat))} or edge numbers, got {self.flat!r}")
+        for name in ("smallest_angle", "smallest_area", "planar_tolerance", "flat_tolerance", "corner_angle"):
             check_number(name, getattr(self, name))
         check_number("smoothing", self.smoothing, above=True, finite=True)
         factors = self.continuation if isinstance(self.continuation, Iterable) else (self.continuation,)

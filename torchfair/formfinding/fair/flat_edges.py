@@ -1,0 +1,129 @@
+"""Which edges the job that lowers E keeps flat: the diagonals of planar panels that arrive as triangles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ...constraints.normal_variation import edge_stencils
+from ...errors import MeshError
+from ...geometry import corner_angles, dihedral_angles
+from ...geometry._ops import angle_of, cross, dot, norm
+from ...topology import Topology
+from .settings import FairSettings
+
+_ROUNDING = 1e-6  # radians: where every edge is flat, angles are those of rounding
+_STRAIGHT = math.radians(1.0)  # how far from 180 degrees the corner of a panel is no corner
+
+
+def edges_to_keep_flat(vertices: Tensor, topology: Topology, settings: FairSettings) -> Tensor:
+    """(n,) numbers of the interior edges that ``settings.flat`` chooses.
+
+    Raises:
+        MeshError: an edge number is out of range.
+    """
+    chosen, count = settings.flat, topology.num_interior_edges
+    if not isinstance(chosen, str):
+        edges = torch.tensor(chosen, dtype=torch.int64)
+        if edges.numel() and not bool(((edges >= 0) & (edges < count)).all()):
+            raise MeshError(f"flat: interior edges are numbered 0 to {count - 1}, got {list(chosen)[:5]}")
+        return edges
+    if chosen == "none":
+        return torch.zeros(0, dtype=torch.int64)
+    arrive = flat_edges(vertices, topology, settings.flat_tolerance)
+    return arrive if chosen == "all" else arrive[_in_panels(vertices, topology, arrive)]
+
+
+def flat_edges(vertices: Tensor, topology: Topology, tolerance: float) -> Tensor:
+    """(n,) numbers of the edges between two triangles that are flat.
+
+    Args:
+        vertices: (V, 3).
+        topology: Any polygon mesh.
+        tolerance: Their angle over the mean angle of all interior edges, at most.
+    """
+    angles = dihedral_angles(vertices, topology).abs()
+    if not angles.numel():
+        return torch.zeros(0, dtype=torch.int64)
+    triangles = (topology.face_sizes[topology.interior_edge_faces] == 3).all(1)
+    return torch.nonzero(triangles & (angles <= max(tolerance * float(angles.mean()), _ROUNDING))).squeeze(1)
+
+
+def _in_panels(vertices: Tensor, topology: Topology, flat: Tensor) -> Tensor:
+    """(n,) bool: which of the edges ``flat`` (n,) are diagonals of panels.
+
+    Coplanar triangles that hang together are one panel, cut by diagonals alone, if no vertex lies among them and they
+    are not all there is. Where its outline passes straight through a vertex, several panels lie in one plane: then its
+    triangles are joined in pairs, the most rectangular first.
+    """
+    sides = topology.interior_edge_faces
+    regions = _components(sides[flat], topology.num_faces)
+    whole = _components(sides, topology.num_faces)
+    size, diagonals = torch.bincount(regions), torch.bincount(regions[sides[flat, 0]], minlength=int(regions.max()) + 1)
+    of_all = torch.bincount(whole)[whole]
+    is_part = torch.zeros_like(size, dtype=torch.bool).index_fill(0, regions[size[regions] < of_all], True)
+    is_panel = is_part & (diagonals == size - 1)  # a vertex among its triangles would close a ring of diagonals
+    several = _have_straight_corners(vertices, topology, regions)
+    owners = regions[sides[flat, 0]]
+    loose = is_panel[owners] & several[owners]
+    kept = is_panel[owners] & ~several[owners]
+    kept[loose] = _paired(vertices, topology, flat[loose])
+    return kept
+
+
+def _components(pairs: Tensor, count: int) -> Tensor:
+    """(count,) numbers of the components of a graph with edges ``pairs`` (n, 2)."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    first, second = pairs.numpy().T
+    graph = coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    return torch.from_numpy(connected_components(graph, directed=False)[1]).long()
+
+
+def _have_straight_corners(vertices: Tensor, topology: Topology, regions: Tensor) -> Tensor:
+    """For every region of faces, regions (F,), whether its outline passes straight through one of its vertices."""
+    keys, inverse = torch.unique(
+        regions[topology.corner_faces] * topology.num_vertices + topology.corners, return_inverse=True
+    )
+    angles = vertices.new_zeros(len(keys)).index_add(0, inverse, corner_angles(vertices, topology))
+    straight = keys[(angles - math.pi).abs() < _STRAIGHT] // topology.num_vertices
+    return torch.bincount(straight, minlength=int(regions.max()) + 1) > 0
+
+
+def _paired(vertices: Tensor, topology: Topology, edges: Tensor) -> Tensor:
+    """(n,) bool: edges (n,) between triangles that make convex quads of them, each triangle in one quad at most.
+
+    Again and again the edges are taken whose quad is more rectangular than all others of its two triangles.
+    """
+    sides = topology.interior_edge_faces[edges]
+    angles = _quad_angles(vertices, topology, edges)
+    score = (angles - 0.5 * math.pi).abs().amax(1)
+    order = torch.argsort(score, stable=True)
+    rank = torch.empty_like(order)
+    rank[order] = torch.arange(len(order))
+    free, chosen = (angles < math.pi - _STRAIGHT).all(1), torch.zeros(len(edges), dtype=torch.bool)
+    while bool(free.any()):
+        best = torch.full((topology.num_faces,), len(edges))
+        best.scatter_reduce_(0, sides[free].T.reshape(-1), rank[free].repeat(2), "amin")
+        new = free & (best[sides] == rank[:, None]).all(1)
+        chosen |= new
+        taken = torch.zeros(topology.num_faces, dtype=torch.bool)
+        taken[sides[new].reshape(-1)] = True
+        free = free & ~taken[sides].any(1)
+    return chosen
+
+
+def _quad_angles(vertices: Tensor, topology: Topology, edges: Tensor) -> Tensor:
+    """(n, 4) angles of the quads that pairs of triangles make across ``edges`` (n,)."""
+    sizes = topology.face_sizes[topology.interior_edge_faces]
+    row = torch.cumsum((sizes == 3).all(1), 0) - 1
+    if not edges.numel():
+        return vertices.new_zeros(0, 4)
+    v, w, left, right = vertices[edge_stencils(topology)[3, 3][row[edges]]].unbind(1)
+    corners = [(v, w, left), (v, right, w), (w, left, v), (w, v, right), (left, v, w), (right, w, v)]
+    parts = [angle_of(norm(cross(b - a, c - a)), dot(b - a, c - a)) for a, b, c in corners]
+    return torch.stack([parts[0] + parts[1], parts[2] + parts[3], parts[4], parts[5]], dim=1)
