@@ -4,9 +4,9 @@ Run ``python benchmarks/bench_printed.py [--jobs fair form symmetric] [--json FI
 
 Every row of a mesh has all differences of the rows before it: the first is the preset ``paper`` with the paper's
 weights, the last the default settings of the job. *Rises* counts steps that raised the merit; only the printed method
-takes such steps. Seconds are processor time of the whole call. The residual of principal-symmetric meshes is the largest
-relative one of the conditions; the share of saddle sides is that of negatively curved stars whose principal neighbours
-are on the right side.
+takes such steps. Seconds are processor time of the whole call. The residual of principal-symmetric meshes is the
+largest relative one of the conditions; the share of saddle sides is that of negatively curved stars whose principal
+neighbours are on the right side.
 """
 
 from __future__ import annotations
