@@ -36,6 +36,12 @@ def test_command_line_is_understood(line: str) -> None:
     assert callable(arguments.run)
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "experiments").glob("[!_]*.py")), ids=lambda path: path.stem)
+def test_the_changelog_and_the_index_of_experiments_name_every_experiment(path: Path) -> None:
+    for page in (ROOT / "CHANGELOG.md", ROOT / "experiments" / "README.md"):
+        assert re.search(rf"\b{path.stem}\b", page.read_text()), f"{page.name} does not name {path.stem}"
+
+
 def test_there_are_examples() -> None:
     assert len(EXAMPLES) >= 3
     assert len(COMMANDS) >= 5

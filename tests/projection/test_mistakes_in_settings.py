@@ -134,7 +134,7 @@ def test_settings_of_the_jobs_and_of_solvers_are_torchfair_errors() -> None:
         (lambda: FairSettings(planar="all"), "planar must be one of"),
         (lambda: FormSettings(smoothing=1.0), "smoothing must be positive and at most coarse_smoothing"),
         (lambda: SymmetricSettings(tight_weight=0.0), "tight_weight must be a number above 0"),
-        (lambda: SymmetricSettings(rounds=0), "rounds must be a whole number of at least 1"),
+        (lambda: SymmetricSettings(rounds=-1), "rounds must be a whole number of at least 0"),
         (lambda: solved(term(), settings={"max_iterations": 3}), "settings must be ProjectionSettings"),
         (lambda: solved(term(), settings=ProjectionSettings(solver="magic")), "unknown linear solver 'magic'"),
     ):

@@ -31,7 +31,7 @@ def absolute_curvature_terms(
     Args:
         topology: Triangle mesh.
         smoothing: Curvature times area below which a star is treated as flat, in the unit of the vertices.
-        weight: Of C; in the unit of the vertices.
+        weight: Of C, which counts once; in the unit of the vertices.
         block: Name of the vertex block.
 
     Raises:

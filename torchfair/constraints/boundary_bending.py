@@ -38,7 +38,7 @@ def boundary_bending_terms(
         topology: Triangle mesh.
         normals: (V, 3) prescribed unit normals at boundary vertices, zero where none is; edges between two count.
         smoothing: As in :func:`absolute_curvature_terms`.
-        weight: Of C.
+        weight: Of the bending, which counts once, as C does.
         block: Name of the vertex block.
     """
     corners = topology.triangles

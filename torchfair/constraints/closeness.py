@@ -66,7 +66,10 @@ def plane_normals(x: Tensor, feet: Tensor, normals: Tensor) -> Tensor:
 
 
 def closeness_terms(planes: Feet, vertices: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
-    """Distance of ``vertices`` (n,) from the reference surface, in their unit; ``planes`` are those of all vertices."""
+    """Distance of ``vertices`` (n,) from the reference surface, in their unit; ``planes`` are those of all vertices.
+
+    The weight multiplies half the squared distance.
+    """
     stencil = [(block, vertices[:, None])]
     return [
         ElementTerm(
@@ -84,7 +87,7 @@ def closeness_terms(planes: Feet, vertices: Tensor, *, weight: float, block: str
 def distance_limit_terms(planes: Feet, limits: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
     """Barrier that no vertex crosses: ``limits`` (V,) are the largest distances allowed; silent below half of it.
 
-    The limits are on the device of the vertices.
+    The weight multiplies half the squared barrier. The limits are on the device of the vertices.
     """
     stencil = [(block, torch.arange(limits.shape[0], device=limits.device)[:, None])]
     refresh = _LimitedPlanes(planes, limits)

@@ -26,7 +26,7 @@ def corner_angle_terms(
         topology: Any polygon mesh.
         smallest: Bound in radians.
         safe: (H,) angle of each corner from which on the barrier is silent, in radians, above ``smallest``.
-        weight: Dimensionless.
+        weight: Of half the squared barrier; dimensionless.
         block: Name of the vertex block.
     """
     angle, slope = partial(angle_barrier, smallest=smallest), partial(angle_barrier_slope, smallest=smallest)
@@ -80,7 +80,10 @@ def face_area_terms(
     weight: float,
     block: str = "vertices",
 ) -> list[ElementTerm]:
-    """Barrier that keeps every face above the fraction ``smallest`` of its own area in ``areas`` (F,)."""
+    """Barrier that keeps every face above the fraction ``smallest`` of its own area in ``areas`` (F,).
+
+    The weight multiplies half the squared barrier.
+    """
     share = partial(area_barrier, smallest=smallest, safe=safe)
     slope = partial(area_barrier_slope, smallest=smallest, safe=safe)
     return [

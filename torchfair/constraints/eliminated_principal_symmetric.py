@@ -65,7 +65,7 @@ def eliminated_principal_symmetric_terms(
     Args:
         edges: (n, 2) principal edges between stars.
         stars: Regular vertices, among them all ends of edges.
-        weight: Dimensionless.
+        weight: Of half the squares; dimensionless. A star counts for four neighbours, so twice.
         block: Name of the vertex block.
 
     Raises:

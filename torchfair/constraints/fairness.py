@@ -47,7 +47,11 @@ def second_difference(x: Tensor) -> Tensor:
 
 
 def interior_fairness_terms(topology: Topology, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
-    """Second differences at interior vertices between four quads, umbrella vectors at the others."""
+    """Second differences at interior vertices between four quads, umbrella vectors at the others.
+
+    The weight multiplies half the squares of :func:`second_difference`, so an eighth of ``|v_- - 2 v + v_+|^2``, and
+    half the squared umbrella vectors.
+    """
     in_grid = _between_quads(topology)
     triples = straight_triples(topology)
     triples = triples[in_grid[triples[:, 1]]]
@@ -71,7 +75,7 @@ def polyline_fairness_terms(
 
     Args:
         topology: Any polygon mesh.
-        weight: Of ``|v_- - 2 v + v_+|^2 / 8``, see :func:`second_difference`.
+        weight: Of an eighth of ``|v_- - 2 v + v_+|^2``.
         corners: (V,) bool, boundary vertices at which the boundary turns.
         block: Name of the vertex block.
     """
@@ -84,7 +88,10 @@ def polyline_fairness_terms(
 def boundary_fairness_terms(
     topology: Topology, corners: Tensor, *, weight: float, block: str = "vertices"
 ) -> list[ElementTerm]:
-    """Second differences along the boundary, except at ``corners`` (V,) bool: keeps gliding vertices apart."""
+    """Second differences along the boundary, except at ``corners`` (V,) bool: keeps gliding vertices apart.
+
+    The weight multiplies an eighth of ``|v_- - 2 v + v_+|^2``.
+    """
     triples = straight_triples(topology, corners=corners)
     triples = triples[topology.is_boundary_vertex[triples[:, 1]]]
     if not triples.numel():
@@ -95,7 +102,8 @@ def boundary_fairness_terms(
 def tangential_fairness_terms(topology: Topology, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
     """Umbrella vectors of interior vertices projected to the tangent planes: spreads vertices, bends nothing.
 
-    The tangent plane is that of the vertex normal and follows the star, so that it is differentiated too.
+    The tangent plane is that of the vertex normal and follows the star, so that it is differentiated too. The weight
+    multiplies half the squares.
     """
     return [
         ElementTerm("tangential fairness", tangential_umbrella, [(block, stencil)], weight=weight)
@@ -111,7 +119,7 @@ def even_fairness_terms(
     The even part is the mean umbrella vector over the neighbourhood, three rings wide, without its tangential
     part. So vertices are spread and stars kept from crumpling, but unlike plain umbrella vectors, which a tube
     makes shorter by shrinking, an evenly bent surface is left in peace. The terms are linear: the even part does
-    not follow the state.
+    not follow the state. The weight multiplies half the squares.
     """
     even = _even_umbrellas(vertices, topology)
     return [
@@ -126,7 +134,7 @@ def displacement_fairness_terms(
     """Umbrella vectors of the displacement from ``base`` (V, 3): a pulled vertex takes its surroundings along.
 
     At boundary vertices second differences along the boundary stand for umbrella vectors. Zero at ``base`` and
-    wherever it is translated to.
+    wherever it is translated to. The weight multiplies half the squared vectors, an eighth of squared differences.
     """
     umbrellas = umbrella_vectors(base, topology)
     terms = [

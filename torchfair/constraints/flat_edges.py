@@ -20,8 +20,8 @@ def flat_edge_terms(topology: Topology, edges: Tensor, *, weight: float, block: 
 
     Args:
         topology: Any polygon mesh.
-        edges: Numbers of interior edges, in 0..I-1; half the weight multiplies the squares.
-        weight: Dimensionless.
+        edges: Numbers of interior edges, in 0..I-1.
+        weight: Of half the squares; dimensionless.
         block: Name of the vertex block.
     """
     chosen = edge_keys(topology.interior_edges[edges], topology)

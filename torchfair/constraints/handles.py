@@ -16,7 +16,10 @@ def offset(x: Tensor, target: Tensor) -> Tensor:
 def handle_terms(
     vertices: Tensor, targets: Tensor, *, weight: float, block: str = "vertices", name: str = "handles"
 ) -> list[ElementTerm]:
-    """Pulls ``vertices`` (n,) to ``targets`` (n, 3); ``name`` is that in the residual table."""
+    """Pulls ``vertices`` (n,) to ``targets`` (n, 3); ``name`` is that in the residual table.
+
+    The weight multiplies half the squared distance.
+    """
     if not vertices.numel():
         return []
     return [ElementTerm(name, offset, [(block, vertices[:, None])], data=(targets,), weight=weight, linear=True)]

@@ -120,10 +120,10 @@ def lifted_absolute_curvature_terms(
     Args:
         topology: Triangle mesh.
         smoothing: Curvature times area below which a star is treated as flat, in the unit of the vertices.
-        weight: Of C; in the unit of the vertices.
-        constraint_weight: Of the constraints, for vertices scaled to edge lengths of about 1. Small weights let
-            curvatures become smaller than those of the shape, large ones make steps short: an uneven start
-            comes faster to the shape with 100 first and 1000 afterwards.
+        weight: Of C, which counts once; in the unit of the vertices.
+        constraint_weight: Of half the squared constraints, for vertices scaled to edge lengths of about 1. Small
+            weights let curvatures become smaller than those of the shape, large ones make steps short: an uneven
+            start comes faster to the shape with 100 first and 1000 afterwards.
         absolute: Makes the absolute value from the smoothing; :class:`~torchfair.projection.LogAbsolute` is reweighted
             as the paper prints it.
 

@@ -95,8 +95,8 @@ def lifted_normal_variation_terms(
         topology: Any polygon mesh.
         planar: (F,) bool: faces whose normal is orthogonal to every edge, as in the paper; the normals of the
             others are tied to their area vectors instead.
-        weight: Weight of E.
-        constraint_weight: Weight of the constraints.
+        weight: Of E, which counts once: half of ``2 delta^2 mu^2``, as a sum of squares.
+        constraint_weight: Of half the squared constraints.
     """
     count = topology.num_interior_edges
     edges = torch.arange(count, device=topology.device)[:, None]

@@ -62,7 +62,7 @@ def lifted_principal_symmetric_terms(
         edges: (n, 2) principal edges between stars.
         stars: Regular vertices, among them all ends of edges.
         is_saddle: (R,) stars whose principal neighbours are to lie on the other side of the tangent plane.
-        weight: Dimensionless.
+        weight: Of half the squared constraints; dimensionless.
         block: Name of the vertex block.
 
     Raises:

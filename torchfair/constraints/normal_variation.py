@@ -25,7 +25,7 @@ def normal_variation_terms(
     Args:
         topology: Any polygon mesh; edges are grouped by the sizes of their two faces.
         smoothing: Length below which ``l l*`` counts as flat, in the unit of the vertices.
-        weight: Dimensionless.
+        weight: Of E, which counts once; dimensionless.
         block: Name of the vertex block.
     """
     terms = []

@@ -45,7 +45,7 @@ def _diagonals(x: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
 def planarity_terms(topology: Topology, faces: Tensor, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
     """Distance of the diagonals of every four consecutive corners of ``faces`` (n,), in the unit of the vertices.
 
-    Triangles among the faces are planar anyway and are passed over.
+    Triangles among the faces are planar anyway and are passed over. The weight multiplies half the squared distance.
     """
     chosen = torch.zeros(topology.num_faces, dtype=torch.bool, device=topology.device)
     chosen[faces] = True

@@ -69,7 +69,7 @@ def cospherical_terms(stars: PrincipalStars, *, weight: float, block: str = "ver
 
     Args:
         stars: Regular vertices; see :meth:`~torchfair.principal.PrincipalEdges.stars`.
-        weight: Dimensionless.
+        weight: Of half the squares; dimensionless.
         block: Name of the vertex block; normals and curvatures are in those of
             :func:`~torchfair.constraints.sphere_blocks`.
     """
@@ -104,7 +104,7 @@ def coplanar_terms(
     Args:
         edges: (n, 2) principal edges; see :func:`~torchfair.constraints.between_stars`.
         stars: Regular vertices, among them all ends of edges.
-        weight: Dimensionless.
+        weight: Of half the squares; dimensionless.
         block: Name of the vertex block; normals are those of :func:`~torchfair.constraints.sphere_blocks`.
 
     Raises:
@@ -141,7 +141,7 @@ def even_star_terms(stars: PrincipalStars, *, weight: float, block: str = "verti
 
     Args:
         stars: Regular vertices.
-        weight: Dimensionless.
+        weight: Of half the squares; dimensionless.
         block: Name of the vertex block.
     """
     return [ElementTerm("even stars", unevenness, [(block, star_stencil(stars))], weight=weight, batched=True)]

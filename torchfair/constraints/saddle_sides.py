@@ -147,7 +147,7 @@ class SaddleSides:
         """Inequalities of every star.
 
         Args:
-            weight: Dimensionless.
+            weight: Of half the squares; dimensionless.
             share: Of the margin.
             ahead: Whether steps heed inequalities that hold and would not hold after them. Otherwise stars may easily
                 become something else than decided.

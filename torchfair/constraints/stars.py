@@ -29,7 +29,8 @@ def star_crossings(x: Tensor) -> Tensor:
 def pyramid_terms(topology: Topology, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
     """Depths of the self-intersections of all normal pyramids; zero, and silent, where there are none.
 
-    The normals are those of the sectors between neighbouring edges: of the faces, where these are planar.
+    The normals are those of the sectors between neighbouring edges: of the faces, where these are planar. The weight
+    multiplies half the squares.
     """
     terms = []
     for stencil in closed_star_stencils(topology):
@@ -56,7 +57,7 @@ def saddle_terms(
         vertices: (V, 3), the start.
         topology: Any polygon mesh.
         saddles: (V,) bool, inner vertices with 4 to 16 edges.
-        weight: Dimensionless.
+        weight: Of half the squares; dimensionless.
         margin: Sine of the angle by which bends and sides of edges have to be clear of zero. With 0 the solver
             stops at the border, where rounding decides.
         block: Name of the vertex block.

@@ -113,7 +113,7 @@ def tangent_plane_terms(
         topology: Triangle mesh.
         vertices: Numbers of boundary vertices.
         normals: Unit normals of stars.
-        weight: Dimensionless.
+        weight: Of half the squares; dimensionless.
         block: Name of the vertex block.
     """
     first, second = tangent_frames(normals)
@@ -137,7 +137,7 @@ def tangent_patch_terms(
         topology: Triangle mesh.
         chosen: (n,) numbers of boundary vertices.
         normals: (n, 3) unit normals of the surface.
-        weight: Dimensionless.
+        weight: Of half the squares; dimensionless.
         block: Name of the vertex block.
     """
     jets = BoundaryJets.of(vertices, topology, chosen, normals, tangent_frames(normals))

@@ -36,8 +36,9 @@ def polyline_fairness(vertices: Tensor, topology: Topology, triples: Tensor | No
             :class:`PolylineFairness` does so once.
 
     Returns:
-        (*batch,) >= 0, unit length^2, unchanged by rigid motions. A quadratic polynomial, smooth everywhere;
-        0 where polylines are straight and evenly spaced. Goes to 0 like h^2 when a mesh of a fixed surface
+        (*batch,) >= 0, unit length^2, unchanged by rigid motions: whole squares; the weight of
+        :func:`~torchfair.constraints.polyline_fairness_terms` counts an eighth. A quadratic polynomial, smooth
+        everywhere; 0 where polylines are straight and evenly spaced. Goes to 0 like h^2 when a mesh of a fixed surface
         is refined regularly to edge length h. Degenerate faces are of no consequence.
 
     Raises:

@@ -31,7 +31,8 @@ def umbrella_fairness(vertices: Tensor, topology: Topology) -> Tensor:
         topology: connectivity; any polygons, mixed.
 
     Returns:
-        (*batch,) >= 0, unit length^2, unchanged by rigid motions. A quadratic polynomial, smooth everywhere;
+        (*batch,) >= 0, unit length^2, unchanged by rigid motions: whole squares; the weight of
+        :func:`~torchfair.constraints.interior_fairness_terms` counts half. A quadratic polynomial, smooth everywhere;
         boundary and isolated vertices contribute nothing, degenerate faces are of no consequence.
 
     Raises:

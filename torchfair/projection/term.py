@@ -41,7 +41,8 @@ class ElementTerm:
             that is not finite rejects the step (this makes barriers possible).
         stencil: ``(block name, (n, k) index tensor)`` pairs; rows of the block, counted from 0.
         data: Tensors ``(n, ...)`` handed to the residual element by element, constant for derivatives.
-        weight: Dimensionless weight of the term, at least 0.
+        weight: Dimensionless weight of the term, at least 0. It multiplies the loss, so with :class:`Squares` half the
+            squares.
         element_weights: ``(n,)`` optional factors, at least 0.
         loss: :class:`Squares`, :class:`SmoothAbsolute`, :class:`OneSided` for inequalities, or another :class:`Loss`.
         refresh: Called with every state that is evaluated; returns the ``data`` for that state (closest

@@ -39,8 +39,8 @@ class DenoiseSettings:
         boundary: ``"free"`` moves boundary vertices like others; ``"fixed"`` keeps them where they are.
         smoothing: ``l l*`` below this is treated as flat, in mean edge lengths.
         curved_smoothing: The same with ``curved``.
-        unfolding_weight: Weight of inequalities that turn folded faces back; 0 leaves them folded.
-        handle_weight: Weight of the squared distance of handles from their targets.
+        unfolding_weight: Weight of half the squared inequalities that turn folded faces back; 0 leaves them folded.
+        handle_weight: Weight of half the squared distance of handles from their targets.
         projection: Iterations, tolerances, damping and linear solver; ``"auto"`` takes conjugate gradients above a
             hundred thousand unknowns, which depend on rounding (of the unit, say) a little.
 

@@ -36,38 +36,39 @@ class FairSettings:
     """What :func:`minimise_normal_variation` trades against what. Lengths are in mean edge lengths of the input.
 
     Attributes:
-        energy_weight: Weight of E.
-        closeness_weight: Weight of the squared distance from the reference surface; 0 switches it off. A boundary
+        energy_weight: Weight of E, which counts once.
+        closeness_weight: Weight of half the squared distance from the reference surface; 0 for none. A boundary
             that glides is left to its curves.
         distance_limit: No vertex goes farther from the reference surface than this, or on a boundary that glides
             from its curve, which bulges over the chords; None for no limit.
-        fairness_weight: Weight of squared second differences and umbrella vectors.
+        fairness_weight: Weight of an eighth of squared second differences (between quads, and along the boundary) and
+            of half of squared umbrella vectors (elsewhere).
         second_differences: Whether fairness is that of second differences along all mesh polylines, the paper's, on
             triangle meshes too.
-        handle_weight: Weight of the squared distance of handles from their targets.
+        handle_weight: Weight of half the squared distance of handles from their targets.
         boundary: ``"glide"`` lets boundary vertices slide on smooth curves through all of them and keeps corners,
             where curves end; ``"fixed"`` keeps them where they are, ``"free"`` leaves them to closeness alone. Between
             two corners with no vertex between them the curve is straight.
-        boundary_weight: Weight of the squared distance from the boundary curves. In the result gliding vertices lie on
-            them exactly, but for those of faces that are kept planar.
+        boundary_weight: Weight of half the squared distance from the boundary curves. In the result gliding vertices
+            lie on them exactly, but for those of faces that are kept planar.
         corner_angle: The boundary has a corner where it turns by more than this, radians.
         planar: ``"keep"`` for the polygons that arrive planar, ``"quads"`` for all polygons with more than
             three corners, ``"none"``, or face numbers.
         planar_tolerance: A polygon arrives planar when its diagonals are nearer than this fraction of its
             mean edge length.
-        planarity_weight: Weight of the squared distance of diagonals.
+        planarity_weight: Weight of half the squared distance of diagonals.
         flat: Edges that stay flat: ``"keep"`` for the diagonals of panels that arrive as coplanar triangles, ``"all"``
             for all edges between triangles that arrive flat, ``"none"``, or numbers of interior edges. Coplanar
             triangles are a panel if no vertex lies among them, and more than they hang together.
         flat_tolerance: An edge arrives flat when its angle is at most this fraction of the mean angle of all edges.
-        flat_weight: Weight of squared ``l l*`` of edges kept flat; where they are not flat enough it is raised.
+        flat_weight: Weight of half of squared ``l l*`` of edges kept flat; where they are not flat enough it is raised.
         smallest_angle: No corner angle falls below this (or below the smallest of the input), radians.
         smallest_area: No face falls below this fraction of its area.
-        quality_weight: Weight of the barriers before those bounds.
+        quality_weight: Weight of half the squared barriers before those bounds.
         smoothing: ``l l*`` below this is treated as flat.
         continuation: Factors of ``smoothing`` in stages before the last, falling; empty for the last stage alone.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables too.
-        constraint_weight: Weight of the constraints that define the auxiliary variables.
+        constraint_weight: Weight of half the squared constraints that define the auxiliary variables.
         projection: Iterations, tolerances, damping and linear solver.
     """
 

@@ -35,19 +35,19 @@ class FormSettings:
     Weights are dimensionless: the problem is solved with unit mean edge length.
 
     Attributes:
-        curvature_weight: Weight of C.
-        fairness_weight: Weight of squared differences of umbrella vectors from the even part of those around:
+        curvature_weight: Weight of C, which counts once.
+        fairness_weight: Weight of half the squared differences of umbrella vectors from the even part of those around:
             keeps stars from crumpling and vertices apart, fades as edges shorten.
-        coarse_fairness_weight: The same while smoothing is coarse.
-        umbrella_weight: Weight of squared umbrella vectors as they are (the paper's fairness): shrinks tubes.
-        tangential_fairness_weight: Weight of their parts in the tangent planes.
+        coarse_fairness_weight: The same, of half the squares, while smoothing is coarse.
+        umbrella_weight: Weight of half the squared umbrella vectors as they are (the paper's fairness): shrinks tubes.
+        tangential_fairness_weight: Weight of half the squares of their parts in the tangent planes.
         boundary: ``"fixed"``, or ``"glide"`` to let boundary vertices slide along the boundary curves, corners
             kept.
-        boundary_weight: Weight of the squared distance of gliding vertices from their curve.
+        boundary_weight: Weight of half the squared distance of gliding vertices from their curve.
         corner_angle: The boundary has a corner where it turns by more than this, radians.
-        tangent_weight: Weight of the squared angle between prescribed and actual normals, radians; ten times it in
-            the end.
-        handle_weight: Weight of the squared distance of handles from their targets.
+        tangent_weight: Weight of half the squared angle between prescribed and actual normals, radians; ten times it
+            in the end.
+        handle_weight: Weight of half the squared distance of handles from their targets.
         coarse_smoothing, smoothing: Stars with less curvature than this fraction of the mean over all stars
             are treated as flat, at first and in the end; in between, by steps of about five.
         least_angle: A surface found with the coarse smoothing that has a smaller corner angle than this, radians
@@ -55,7 +55,7 @@ class FormSettings:
             last smoothing alone; likewise one that has not converged. In space no step leads to a smaller one.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables
             too (for comparison: slower).
-        constraint_weight: Weight of the constraints that define auxiliary variables.
+        constraint_weight: Weight of half the squared constraints that define auxiliary variables.
         absolute_value: Of curvatures that are unknowns, those of the lifted formulation: ``"smooth"`` is reweighted by
             the inverse of ``sqrt(x^2 + smoothing^2)``, ``"logarithmic"`` by that of ``|x| + smoothing``, as the paper
             prints it.

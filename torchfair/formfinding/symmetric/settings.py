@@ -33,21 +33,21 @@ class SymmetricSettings:
     """What :func:`principal_symmetric` trades against what. Weights are dimensionless: mean edge length 1.
 
     Attributes:
-        constraint_weight: Weight of the conditions while the shape is found.
-        tight_weight: Their weight once it is found; at last they are met exactly, without any other aim.
-        fairness_weight: Weight of squared umbrella vectors of the displacement from the start of the level: handles
-            pull their surroundings along.
+        constraint_weight: Weight of half the squared conditions while the shape is found.
+        tight_weight: Weight of the same once it is found; at last they are met exactly, without any other aim.
+        fairness_weight: Weight of half the squared umbrella vectors of the displacement from the start of the level:
+            handles pull their surroundings along. Of second differences, also at the boundary, an eighth counts.
         second_differences: Whether fairness is that of plain second differences along all mesh polylines, the paper's,
             which shrink and straighten shapes; not of the displacement.
-        evenness_weight: Weight of stars being symmetric along their principal polyline, which undoes shear; 3 for
-            principal quads cut by diagonals.
-        anchor_weight: Weight of the squared displacement itself: how far around a handle the mesh follows, about the
-            inverse fourth root of its quotient with ``fairness_weight`` in edges.
-        handle_weight: Weight of the squared distance of handles from their targets.
-        closeness_weight: Weight of the squared distance from the reference surface, if there is one.
-        energy_weight: Weight of E, the paper's w_target; 0 without.
+        evenness_weight: Weight of half the squares by which stars miss being symmetric along their principal polyline,
+            which undoes shear; 3 for principal quads cut by diagonals.
+        anchor_weight: Weight of half the squared displacement itself: how far around a handle the mesh follows, about
+            the inverse fourth root of its quotient with ``fairness_weight`` in edges.
+        handle_weight: Weight of half the squared distance of handles from their targets.
+        closeness_weight: Weight of half the squared distance from the reference surface, if there is one.
+        energy_weight: Weight of E, which counts once; 0 without.
         energy_smoothing: ``l l*`` below this is treated as flat.
-        saddle_weight: Weight of the conditions on saddle sides.
+        saddle_weight: Weight of half the squares by which saddle sides are missed.
         saddle_margin: How far beyond the bound principal neighbours are pushed, in curvatures of the star's sphere.
         boundary: ``"free"``, or ``"fixed"`` to keep boundary vertices where they are.
         smallest_angle: No corner angle falls below this while the shape is found, radians; 0 for no bound.
