@@ -12,7 +12,7 @@ Samplings of surfaces that are negatively curved everywhere:
 * *random*: vertices at random, evened out, with Delaunay triangles; valences differ.
 
 A saddle goes by the best plane that shows it (a good one if there is one, otherwise one that cuts opposite sides
-alike): where that is not 1, 2, 1, 2 no plane shows this pattern. Patterns at the ordinary vertex normal are counted, too.
+alike): where that is not 1, 2, 1, 2 no plane shows this pattern. Patterns at the vertex normal are counted, too.
 Counted are inner vertices of valence six none of whose neighbours is on the boundary.
 """
 

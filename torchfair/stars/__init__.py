@@ -6,6 +6,8 @@ from .classification import StarKind as StarKind
 from .classification import classify_stars as classify_stars
 from .gauss_overlaps import GaussOverlaps as GaussOverlaps
 from .gauss_overlaps import gauss_overlaps as gauss_overlaps
+from .polar_dual import PolarDual as PolarDual
+from .polar_dual import polar_dual as polar_dual
 from .pyramid import normal_pyramid as normal_pyramid
 from .pyramid import pyramid_perimeters as pyramid_perimeters
 from .pyramid import pyramid_self_intersections as pyramid_self_intersections
