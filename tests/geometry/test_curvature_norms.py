@@ -67,3 +67,18 @@ def test_values_of_the_cases():
     assert values == pytest.approx([0, 4, 2, 1, 2])
     values = [frobenius_norms(symmetric(*matrix)).item() for matrix in KINKS.values()]
     assert values == pytest.approx([0, math.sqrt(8), math.sqrt(2), 1, 2])
+
+
+def test_norms_bound_how_fast_normals_turn():
+    """Inequality (3) of the paper, |W x| <= |W| |x|, for both norms, with equality for some x where one curvature is 0."""
+    generator = torch.Generator().manual_seed(0)
+    matrices = torch.randn(200, 2, 2, dtype=DOUBLE, generator=generator)
+    matrices = matrices + matrices.mT
+    steps = torch.randn(200, 2, dtype=DOUBLE, generator=generator)
+    turns = torch.linalg.vector_norm((matrices @ steps[..., None]).squeeze(-1), dim=-1)
+    for norms in (nuclear_norms, frobenius_norms):
+        assert (turns <= norms(matrices) * torch.linalg.vector_norm(steps, dim=-1)).all()
+        cylinder = symmetric(3.0, 0.0, 0.0)
+        assert (
+            norms(cylinder).item() == torch.linalg.vector_norm(cylinder @ torch.tensor([1.0, 0.0]).to(cylinder)).item()
+        )
