@@ -70,7 +70,7 @@ def test_values_of_the_cases():
 
 
 def test_norms_bound_how_fast_normals_turn():
-    """Inequality (3) of the paper, |W x| <= |W| |x|, for both norms, with equality for some x where one curvature is 0."""
+    """Inequality (3) of the paper, |W x| <= |W| |x|, for both norms, with equality for some x on cylinders."""
     generator = torch.Generator().manual_seed(0)
     matrices = torch.randn(200, 2, 2, dtype=DOUBLE, generator=generator)
     matrices = matrices + matrices.mT
