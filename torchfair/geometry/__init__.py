@@ -17,6 +17,9 @@ from .curvature_norms import frobenius_norms as frobenius_norms
 from .curvature_norms import nuclear_norms as nuclear_norms
 from .dihedral import dihedral_angles as dihedral_angles
 from .dual_edges import dual_edge_lengths as dual_edge_lengths
+from .fitted_curvature import FittedCurvature as FittedCurvature
+from .fitted_curvature import fitted_curvature as fitted_curvature
+from .fitted_curvature import rings_for_noise as rings_for_noise
 from .gauss_image import GaussImage as GaussImage
 from .gauss_image import gauss_image as gauss_image
 from .lengths import edge_lengths as edge_lengths
@@ -28,6 +31,7 @@ from .normals import face_normals as face_normals
 from .normals import vertex_normals as vertex_normals
 from .offsets import conical_deviations as conical_deviations
 from .offsets import offset_directions as offset_directions
+from .patches import Patches as Patches
 from .planarity import planarity as planarity
 from .polylines import second_differences as second_differences
 from .principal_curvatures import principal_directions as principal_directions

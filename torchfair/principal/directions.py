@@ -93,7 +93,7 @@ def _fields(vertices: Tensor, topology: Topology, directions: Tensor | None) -> 
         raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3)", tuple(vertices.shape))
     if directions is None:
         directions = principal_directions(vertices, topology).clone()
-        directions[topology.is_boundary_vertex] = 0  # stars on the boundary are not complete
+        directions[topology.is_boundary_vertex] = 0  # directions there are less certain
     elif directions.shape not in ((topology.num_vertices, 3), (topology.num_vertices, 2, 3)):
         expected = f"({topology.num_vertices}, 3) or ({topology.num_vertices}, 2, 3)"
         raise ShapeError("directions", expected, tuple(directions.shape))

@@ -1,0 +1,88 @@
+"""Which vertices lie within some rings."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from geometry_meshes import mixed_grid, with_isolated
+from helpers import wavy_grid
+
+from torchfair import Topology
+from torchfair.errors import SettingsError
+from torchfair.geometry import Patches
+from torchfair.geometry import patches as patches_module
+from torchfair.shapes import Paraboloid, Torus, irregular_triangles, rotated_lattice
+
+
+def within(topology: Topology, rings: int) -> torch.Tensor:
+    """(V, V) by repeated steps across faces, one vertex after the other."""
+    near = torch.eye(topology.num_vertices, dtype=torch.bool)
+    for _ in range(rings):
+        wider = near.clone()
+        for face in topology.face_lists():
+            wider[:, face] |= near[:, face].any(1, keepdim=True)
+        near = wider
+    return near
+
+
+def table(patches: Patches, count: int) -> torch.Tensor:
+    found = torch.zeros(count, count, dtype=torch.int64)
+    for centres, members, present in patches.groups:
+        for centre, row, there in zip(centres, members, present, strict=True):
+            found[centre].index_add_(0, row[there], torch.ones_like(row[there]))
+    return found
+
+
+def grown(topology: Topology, rings: int) -> torch.Tensor:
+    lattice = 1 + 3 * rings * (rings + 1)
+    expected = within(topology, rings)
+    small = expected.sum(1) < 0.8 * lattice
+    for more in range(1, rings + 1):
+        growing = small & (expected.sum(1) < 1.25 * lattice)
+        if more == 1:
+            growing = small
+        expected = torch.where(growing[:, None], within(topology, rings + more), expected)
+    return expected
+
+
+@pytest.mark.parametrize("rings", [1, 2, 3])
+@pytest.mark.parametrize("mesh", [mixed_grid, lambda: wavy_grid(9, 7, triangles=True)], ids=["mixed", "triangles"])
+def test_members_are_all_within_the_rings_and_more_where_they_are_few(mesh, rings) -> None:
+    _, topology = mesh()
+    found = table(Patches(topology, rings), topology.num_vertices)
+    assert found.equal(grown(topology, rings).long())  # each once
+
+
+def test_a_lattice_without_boundary_has_its_rings() -> None:
+    topology = rotated_lattice(Torus(), 12, 24, 0.0).topology
+    sizes = table(Patches(topology, 2), topology.num_vertices).sum(1)
+    assert set(sizes[~topology.is_boundary_vertex].tolist()) >= {19}
+
+
+def test_isolated_vertices_have_themselves() -> None:
+    _, topology = with_isolated(mixed_grid())
+    found = table(Patches(topology, 2), topology.num_vertices)
+    assert found[-1].nonzero().flatten().tolist() == [topology.num_vertices - 1]
+
+
+def test_means_are_those_of_the_members(monkeypatch: pytest.MonkeyPatch) -> None:
+    vertices, topology = wavy_grid(9, 8)
+    shares = grown(topology, 2).to(vertices)
+    expected = shares @ vertices / shares.sum(1, keepdim=True)
+    torch.testing.assert_close(Patches(topology, 2).means(vertices), expected)
+    monkeypatch.setattr(patches_module, "_PAIRS", 200)  # many groups
+    patches = Patches(topology, 2)
+    assert len(patches.groups) > 5
+    torch.testing.assert_close(patches.means(vertices.expand(2, -1, -1))[1], expected)
+
+
+def test_groups_hold_little_more_than_their_members() -> None:
+    topology = irregular_triangles(Paraboloid(1.0, -1.0), 3000).topology
+    groups = Patches(topology, 3).groups
+    assert sum(members.numel() for _, members, _ in groups) < 1.6 * sum(int(group.present.sum()) for group in groups)
+
+
+@pytest.mark.parametrize("rings", [0, -1, 1.5, True, None])
+def test_rings_are_counted(rings: object) -> None:
+    with pytest.raises(SettingsError, match="rings must be a whole number of at least 1"):
+        Patches(wavy_grid(3, 3)[1], rings)
