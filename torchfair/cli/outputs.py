@@ -70,8 +70,7 @@ class Outputs:
 
     def prepare(self) -> None:
         """Refuses unknown mesh formats and, unless forced, files that exist."""
-        if self.mesh.suffix.lower() not in _MESH_FORMATS:
-            raise CommandError(f"cannot write '{self.mesh}': choose a name that ends in {', '.join(_MESH_FORMATS)}")
+        refuse_unknown_format(self.mesh)
         refuse_existing(self.paths(), force=self.force)
 
     def make_folders(self) -> None:
@@ -101,6 +100,12 @@ class Outputs:
     def _write(self, files: Mapping[Path, Writer], request: Request, result: Any) -> None:
         for path, writer in files.items():
             writer(path, request, result, self.force)
+
+
+def refuse_unknown_format(path: Path) -> None:
+    """Refuses names of mesh files that do not say how to write them."""
+    if path.suffix.lower() not in _MESH_FORMATS:
+        raise CommandError(f"cannot write '{path}': choose a name that ends in {', '.join(_MESH_FORMATS)}")
 
 
 def refuse_existing(paths: Sequence[Path], *, force: bool) -> None:
