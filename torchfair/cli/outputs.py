@@ -27,6 +27,7 @@ class Request:
         options: Arguments of the function that does it, by name, beside settings and callback.
         start: Its first arguments; by default vertices and topology of the mesh.
         notes: What was decided while reading, in words.
+        settings: To solve with; by default those that options ask for.
         report: Entries of ``report.json`` beside those that all jobs have.
     """
 
@@ -34,6 +35,7 @@ class Request:
     options: dict[str, Any]
     start: Sequence[Any] = ()
     notes: list[str] = field(default_factory=list)
+    settings: Any = None
     report: dict[str, Any] = field(default_factory=dict)
 
 

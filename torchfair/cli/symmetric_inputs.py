@@ -37,7 +37,7 @@ def read_principal_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tu
 
     topology, allow = mesh.topology, arguments.allow_exceptions
     if arguments.seed is not None:
-        edges = principal_edges_from_seed(topology, _edge(arguments.seed, mesh), allow_exceptions=allow)
+        edges = principal_edges_from_seed(topology, joined_edge(arguments.seed, mesh), allow_exceptions=allow)
         return edges, _exceptions(edges)
     file = arguments.labels or labels_beside(arguments.input)
     if file is not None:
@@ -72,7 +72,8 @@ def polyline_vertices(chosen: Sequence[int], mesh: PolygonMesh, edges: Principal
     return on_lines
 
 
-def _edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
+def joined_edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
+    """Number of the edge between two vertices."""
     import torch
 
     from .._graph import edge_numbers
