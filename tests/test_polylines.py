@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 import torch
-from helpers import cube, grid_faces, split_quads, tetrahedron
+from helpers import cube, grid_faces, split_quads, tetrahedron, wavy_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mesh_shelf import HYBRID, torus_faces
 
 from torchfair import MeshError, ShapeError, Topology
-from torchfair.polylines import mesh_polylines, straight_triples
+from torchfair.polylines import mesh_polylines, polylines_along, straight_triples
 
 
 def torus(rows: int, columns: int, *, triangles: bool = False) -> Topology:
@@ -196,3 +198,21 @@ def test_relabelling(name: str, seed: int) -> None:
     assert as_sets(new[straight_triples(topology)]) == as_sets(straight_triples(other))
     mine = sorted(sorted(edges_along(new[line])) for line in mesh_polylines(topology))
     assert mine == sorted(sorted(edges_along(line)) for line in mesh_polylines(other))
+
+
+def test_polylines_along_marked_edges_are_pieces_of_mesh_polylines() -> None:
+    vertices, topology = wavy_grid(5, 4, triangles=True)
+    assert vertices.shape[0] == topology.num_vertices
+    everything = torch.ones(topology.num_edges, dtype=torch.bool)
+    lines = [line.tolist() for line in polylines_along(topology, everything)]
+    assert lines == [line.tolist() for line in mesh_polylines(topology)]
+    marked = torch.arange(topology.num_edges) % 3 > 0
+    pieces = [line.tolist() for line in polylines_along(topology, marked)]
+    steps = sorted(tuple(sorted(pair)) for line in pieces for pair in itertools.pairwise(line))
+    assert steps == sorted(tuple(sorted(pair)) for pair in topology.edges[marked].tolist())
+    together = {tuple(line[i : i + 3]) for line in lines for i in range(len(line) - 2)}
+    together |= {triple[::-1] for triple in together}
+    assert all(tuple(line[i : i + 3]) in together for line in pieces for i in range(len(line) - 2))
+    assert polylines_along(topology, ~everything) == []
+    with pytest.raises(ShapeError, match="mask"):
+        polylines_along(topology, everything[1:])

@@ -21,6 +21,7 @@ from .io import PolygonMesh as PolygonMesh
 from .io import load_mesh as load_mesh
 from .io import save_mesh as save_mesh
 from .polylines import mesh_polylines as mesh_polylines
+from .polylines import polylines_along as polylines_along
 from .polylines import straight_triples as straight_triples
 from .repair import RepairedMesh as RepairedMesh
 from .repair import repair_mesh as repair_mesh

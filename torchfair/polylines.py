@@ -7,6 +7,7 @@ import itertools
 import torch
 from torch import Tensor
 
+from ._graph import edge_numbers
 from .errors import MeshError, ShapeError
 from .topology import Topology
 
@@ -90,6 +91,28 @@ def mesh_polylines(topology: Topology, *, corners: Tensor | None = None) -> list
         Vertex numbers, one int64 tensor of two or more for each polyline, on the device of ``topology``.
     """
     return join_triples(topology.edges, straight_triples(topology, corners=corners), topology.num_vertices)
+
+
+def polylines_along(topology: Topology, mask: Tensor) -> list[Tensor]:
+    """Vertices along every polyline of marked edges; each marked edge belongs to exactly one.
+
+    They run straight on as :func:`mesh_polylines` do, and end where the next edge is not marked.
+
+    Args:
+        topology: any polygon mesh.
+        mask: (E,) bool.
+
+    Returns:
+        As of :func:`mesh_polylines`.
+
+    Raises:
+        ShapeError: if ``mask`` is not a bool tensor (E,).
+    """
+    if mask.shape != (topology.num_edges,) or mask.dtype != torch.bool:
+        raise ShapeError("mask", f"a bool tensor ({topology.num_edges},)", f"{tuple(mask.shape)} {mask.dtype}")
+    triples = straight_triples(topology)
+    both = mask[edge_numbers(topology, triples.unfold(1, 2, 1))].all(1)
+    return join_triples(topology.edges[mask], triples[both], topology.num_vertices)
 
 
 def join_triples(edges: Tensor, triples: Tensor, num_vertices: int) -> list[Tensor]:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 import torch
-from helpers import wavy_grid
+from geometry_meshes import mixed_grid
 
 from torchfair.cli import main
 from torchfair.formfinding.symmetric.measures import condition_residuals
 from torchfair.io import load_edge_labels, load_mesh, save_edge_labels, save_mesh
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
-from torchfair.shapes import Catenoid, Paraboloid, Torus, principal_triangles
+from torchfair.shapes import Catenoid, Paraboloid, Torus, principal_quads, principal_triangles
 from torchfair.shapes.principal_triangles import parameter_triangles
 
 
@@ -105,10 +105,10 @@ def test_refusals(torus: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert not (torus.parent / "x.obj").exists()
 
 
-def test_meshes_without_triangles_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    vertices, topology = wavy_grid()
-    save_mesh(tmp_path / "quads.obj", vertices, topology)
-    assert main(["symmetric", str(tmp_path / "quads.obj"), "-o", str(tmp_path / "x.obj")]) == 2
+def test_meshes_of_triangles_and_others_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vertices, topology = mixed_grid()
+    save_mesh(tmp_path / "mixed.obj", vertices, topology)
+    assert main(["symmetric", str(tmp_path / "mixed.obj"), "-o", str(tmp_path / "x.obj")]) == 2
     assert "triangle" in error_line(capsys)
 
 
@@ -124,3 +124,35 @@ def test_exceptions_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "principal edges" in error_line(capsys)
     assert main(["symmetric", *words, "--no-pictures", "--allow-exceptions"]) == 0
     assert "do not fit" in capsys.readouterr().out
+
+
+def test_quads_are_cut_into_triangles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The family that bends less is principal, or that of the seed, or of marked edges; evenness is on unless asked."""
+    mesh = principal_quads(Torus(), 6, 12)
+    plain, marked = tmp_path / "quads.obj", tmp_path / "marked.obj"
+    save_mesh(plain, mesh.vertices, mesh.topology)
+    circles = mesh.edges_along("u")
+    line = mesh.topology.edges[circles][0]
+    save_mesh(marked, mesh.vertices, mesh.topology, polylines=[line])
+    seed = [str(vertex) for vertex in line.tolist()]
+    weights = {}
+    for number, words in enumerate(([str(plain)], [str(marked)], [str(plain), "--seed", *seed, "--evenness", "0"])):
+        output = tmp_path / str(number) / "design.obj"
+        assert main(["symmetric", *words, "-o", str(output), "--no-pictures"]) == 0
+        assert "72 quads are cut by diagonals in alternating rows" in capsys.readouterr().out
+        made = load_mesh(output)
+        edges = PrincipalEdges(made.topology, load_edge_labels(output, made.topology)).check()
+        found = {frozenset(pair) for pair in made.topology.edges[edges.mask].tolist()}
+        assert found == {frozenset(pair) for pair in mesh.topology.edges[circles].tolist()}
+        report = json.loads((output.parent / "report.json").read_text())
+        weights[number] = report["settings"]["evenness_weight"]
+        assert report["holds"]
+    assert weights == {0: 3.0, 1: 3.0, 2: 0.0}
+
+
+def test_marks_in_both_families_of_quads_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = principal_quads(Torus(), 6, 12)
+    lines = [mesh.topology.edges[mesh.edges_along(along)][0] for along in ("u", "v")]
+    save_mesh(tmp_path / "quads.obj", mesh.vertices, mesh.topology, polylines=lines)
+    assert main(["symmetric", str(tmp_path / "quads.obj"), "-o", str(tmp_path / "out.obj"), "--no-pictures"]) == 2
+    assert "marks edges of both families" in error_line(capsys)

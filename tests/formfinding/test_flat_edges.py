@@ -18,7 +18,7 @@ from torchfair.errors import SettingsError
 from torchfair.formfinding import FairSettings, minimise_normal_variation
 from torchfair.formfinding.fair.flat_edges import edges_to_keep_flat
 from torchfair.geometry import dihedral_angles
-from torchfair.shapes import hybrid_roof
+from torchfair.shapes import example_roof, hybrid_roof
 from torchfair.subdivision import midpoint
 from torchfair.triangulation import triangulate
 
@@ -110,6 +110,16 @@ def test_tolerance_is_a_share_of_the_mean_angle() -> None:
     found = edges_to_keep_flat(vertices, triangles, beyond)
     assert len(found) > len(wanted)
     assert float(angles[found].max()) <= 0.05 * float(angles.mean())
+
+
+def test_what_is_flat_by_chance_is_no_panel() -> None:
+    """Six in a thousand edges of a smooth roof have angles below a hundredth of the mean."""
+    vertices, topology = example_roof()
+    for tolerance in (1e-3, 1e-2, 3e-2):
+        every = len(kept(vertices, topology, FairSettings(flat="all", flat_tolerance=tolerance)))
+        assert every < tolerance * topology.num_interior_edges
+        assert kept(vertices, topology, FairSettings(flat_tolerance=tolerance)) == set()
+    assert every > 20
 
 
 @given(seed=st.integers(0, 1000), scale=st.sampled_from([1e-3, 1.0, 1e4]))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from .inputs import add_handles, add_reference, add_repair, read_handles, read_input, read_reference
+from .inputs import add_handles, add_levels, add_reference, add_repair, read_handles, read_input, read_reference
 from .job_command import JobCommand
 from .outputs import Request, Writer
 from .pictures import draw_before_after
@@ -20,13 +20,14 @@ def _edges(path: Path, request: Request, result: JobResult[Level], overwrite: bo
     from ..viewing import picture_edges
 
     meshes = {"before": request.mesh.vertices, "after": result.vertices}
-    picture_edges(path, meshes, result.topology, overwrite=overwrite)
+    picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
 
 
 def _gauss_images(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
     from ..viewing import picture_gauss_images
 
-    picture_gauss_images(path, request.mesh.vertices, result.vertices, result.topology, overwrite=overwrite)
+    both = request.mesh.topology, result.topology
+    picture_gauss_images(path, request.mesh.vertices, result.vertices, both, overwrite=overwrite)
 
 
 class FairCommand(JobCommand):
@@ -61,12 +62,17 @@ class FairCommand(JobCommand):
         """A mesh, a surface to stay close to, and handles."""
         parser.add_argument("input", metavar="INPUT", help="mesh file, or example:roof or example:hybrid_roof")
         add_reference(parser, "stay close to this surface instead of the input")
+        add_levels(parser)
         add_handles(parser)
         add_repair(parser)
 
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""
-        options = {"reference": read_reference(arguments), "handles": read_handles(arguments)}
+        options = {
+            "reference": read_reference(arguments),
+            "handles": read_handles(arguments),
+            "levels": arguments.levels,
+        }
         return Request(read_input(arguments.input, arguments.repair), options)
 
 

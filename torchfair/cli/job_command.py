@@ -98,6 +98,7 @@ class JobCommand(ABC):
         outputs = self.outputs(arguments)
         outputs.prepare()
         request = self.read(arguments, settings)
+        settings = request.settings or settings
         outputs.make_folders()
         result = self._solve(request, settings)
         outputs.write_mesh(request, result)

@@ -27,6 +27,7 @@ class Request:
         options: Arguments of the function that does it, by name, beside settings and callback.
         start: Its first arguments; by default vertices and topology of the mesh.
         notes: What was decided while reading, in words.
+        settings: To solve with; by default those that options ask for.
         report: Entries of ``report.json`` beside those that all jobs have.
     """
 
@@ -34,6 +35,7 @@ class Request:
     options: dict[str, Any]
     start: Sequence[Any] = ()
     notes: list[str] = field(default_factory=list)
+    settings: Any = None
     report: dict[str, Any] = field(default_factory=dict)
 
 
@@ -70,8 +72,7 @@ class Outputs:
 
     def prepare(self) -> None:
         """Refuses unknown mesh formats and, unless forced, files that exist."""
-        if self.mesh.suffix.lower() not in _MESH_FORMATS:
-            raise CommandError(f"cannot write '{self.mesh}': choose a name that ends in {', '.join(_MESH_FORMATS)}")
+        refuse_unknown_format(self.mesh)
         refuse_existing(self.paths(), force=self.force)
 
     def make_folders(self) -> None:
@@ -101,6 +102,12 @@ class Outputs:
     def _write(self, files: Mapping[Path, Writer], request: Request, result: Any) -> None:
         for path, writer in files.items():
             writer(path, request, result, self.force)
+
+
+def refuse_unknown_format(path: Path) -> None:
+    """Refuses names of mesh files that do not say how to write them."""
+    if path.suffix.lower() not in _MESH_FORMATS:
+        raise CommandError(f"cannot write '{path}': choose a name that ends in {', '.join(_MESH_FORMATS)}")
 
 
 def refuse_existing(paths: Sequence[Path], *, force: bool) -> None:

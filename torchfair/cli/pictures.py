@@ -12,10 +12,11 @@ if TYPE_CHECKING:
 
 
 def draw_before_after(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
-    """Both, shaded and as mirrors; for jobs that keep the topology."""
+    """Both, shaded and as mirrors; the result may be a refinement."""
     from ..viewing import picture_before_after
 
-    picture_before_after(path, request.mesh.vertices, result.vertices, result.topology, overwrite=overwrite)
+    both = request.mesh.topology, result.topology
+    picture_before_after(path, request.mesh.vertices, result.vertices, both, overwrite=overwrite)
 
 
 def draw_edges(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:

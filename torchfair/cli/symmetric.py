@@ -14,6 +14,7 @@ from .outputs import Outputs, Request, Writer
 from .pictures import draw_edges
 from .strips import StripFiles, add_strips
 from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edges, vertex_mask
+from .symmetric_quads import even_settings, read_quads
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -41,10 +42,10 @@ class SymmetricCommand(JobCommand):
     job = "symmetric"
     purpose = "design a principal-symmetric mesh"
     description = (
-        "Makes a triangle mesh principal-symmetric: one third of its edges follow principal curvature lines and the "
-        "others lie symmetrically to them, which represents saddles best. Pulls vertices, refines the mesh, and writes "
-        "developable strips along the principal edges. In an OBJ file principal edges are line elements, beside others "
-        "stands NAME.edges.json."
+        "Makes a triangle mesh, or a quad mesh cut by diagonals, principal-symmetric: one third of its edges follow "
+        "principal curvature lines and the others lie symmetrically to them, which represents saddles best. Pulls "
+        "vertices, refines the mesh, and writes developable strips along the principal edges. In an OBJ file principal "
+        "edges are line elements, beside others stands NAME.edges.json."
     )
     option_names: ClassVar[Mapping[str, str]] = {"most_steps": "steps"}
     pictures: ClassVar[Mapping[str, Writer]] = {"principal.png": _principal, "edges.png": draw_edges}
@@ -64,7 +65,11 @@ class SymmetricCommand(JobCommand):
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh with principal edges, handles, a reference, and strips to make."""
         add = parser.add_argument
-        add("input", metavar="INPUT", help="triangle mesh, or a built-in example:NAME")
+        add(
+            "input",
+            metavar="INPUT",
+            help="triangle or quad mesh, or a built-in example:NAME; quads are cut by diagonals",
+        )
         add_labels(parser)
         add_handles(parser)
         add("--fix", nargs="+", type=count, default=[], metavar="VERTEX", help="vertices that keep their places")
@@ -79,9 +84,16 @@ class SymmetricCommand(JobCommand):
         return SymmetricOutputs(arguments, self.pictures)
 
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
-        """See the base class."""
+        """See the base class; quads are cut into triangles."""
+        from ..io import PolygonMesh
+
         handles, mesh = read_handles(arguments), read_input(arguments.input)
-        edges, notes = read_principal_edges(arguments, mesh)
+        if mesh.topology.is_quadrangular:
+            edges, vertices, notes = read_quads(arguments, mesh)
+            settings = even_settings(arguments, settings)
+            mesh = PolygonMesh(vertices, edges.topology)
+        else:
+            edges, notes = read_principal_edges(arguments, mesh)
         options = {
             "handles": handles,
             "fixed": vertex_mask("--fix", arguments.fix, mesh),
@@ -89,7 +101,7 @@ class SymmetricCommand(JobCommand):
             "on": polyline_vertices(arguments.on, mesh, edges) if arguments.on else None,
             "levels": arguments.levels,
         }
-        return Request(mesh, options, (mesh.vertices, edges), notes)
+        return Request(mesh, options, (mesh.vertices, edges), notes, settings)
 
     def most_steps(self, settings: Any) -> int:
         """Those of a level."""

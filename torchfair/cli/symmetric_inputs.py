@@ -37,9 +37,9 @@ def read_principal_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tu
 
     topology, allow = mesh.topology, arguments.allow_exceptions
     if arguments.seed is not None:
-        edges = principal_edges_from_seed(topology, _edge(arguments.seed, mesh), allow_exceptions=allow)
+        edges = principal_edges_from_seed(topology, joined_edge(arguments.seed, mesh), allow_exceptions=allow)
         return edges, _exceptions(edges)
-    file = arguments.labels or _labels_beside(arguments.input)
+    file = arguments.labels or labels_beside(arguments.input)
     if file is not None:
         edges = PrincipalEdges(topology, load_edge_labels(file, topology))
         return (edges if allow else edges.check()), [f"principal edges are those of {file}", *_exceptions(edges)]
@@ -72,7 +72,8 @@ def polyline_vertices(chosen: Sequence[int], mesh: PolygonMesh, edges: Principal
     return on_lines
 
 
-def _edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
+def joined_edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
+    """Number of the edge between two vertices."""
     import torch
 
     from .._graph import edge_numbers
@@ -84,7 +85,7 @@ def _edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
     return number
 
 
-def _labels_beside(name: str) -> Path | None:
+def labels_beside(name: str) -> Path | None:
     """The file that marks edges of INPUT, if there is one."""
     from ..io import edge_labels_path
 

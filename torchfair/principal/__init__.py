@@ -11,6 +11,8 @@ from .labels import principal_edges_from_seed as principal_edges_from_seed
 from .labels import principal_edges_of_lattice as principal_edges_of_lattice
 from .principal_edges import PrincipalEdges as PrincipalEdges
 from .principal_edges import PrincipalStars as PrincipalStars
+from .quads import half_shifted as half_shifted
+from .quads import triangles_from_quads as triangles_from_quads
 from .spheres import StarSpheres as StarSpheres
 from .spheres import principal_normals as principal_normals
 from .spheres import star_spheres as star_spheres

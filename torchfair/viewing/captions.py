@@ -8,11 +8,13 @@ from ..energies import angle_variation, normal_variation
 from ..topology import Topology
 
 
-def energy_caption(name: str, vertices: Tensor, topology: Topology, reference: Tensor | None = None) -> str:
-    """``name``, E and E' of one mesh ``(V, 3)``; with a ``reference`` also the change of E against it in percent."""
+def energy_caption(
+    name: str, vertices: Tensor, topology: Topology, reference: tuple[Tensor, Topology] | None = None
+) -> str:
+    """``name``, E and E' of one mesh ``(V, 3)``; with a ``reference`` mesh also how E has changed, in percent."""
     energy = float(normal_variation(vertices, topology))
     caption = f"{literal(name)}     $E$ = {energy:#.4g}"
-    base = float(normal_variation(reference, topology)) if reference is not None else 0.0
+    base = float(normal_variation(*reference)) if reference is not None else 0.0
     if base > 0:
         caption += f"  ({signed_percent(energy / base - 1)})"
     return caption + f"     $E'$ = {float(angle_variation(vertices, topology)):#.4g}"

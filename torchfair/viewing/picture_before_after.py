@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 
 from torch import Tensor
 
 from .._one_mesh import one_mesh
+from ..errors import ShapeError
 from ..reflection import Stripes, face_mirror_directions
 from ..topology import Topology
 from .camera import fit_camera
@@ -22,7 +24,7 @@ def picture_before_after(
     path: str | os.PathLike[str],
     before: Tensor,
     after: Tensor,
-    topology: Topology,
+    topology: Topology | Sequence[Topology],
     title: str = "",
     *,
     view: ViewDirection | None = None,
@@ -38,7 +40,7 @@ def picture_before_after(
         path: the PNG file.
         before: positions ``(V, 3)``.
         after: positions ``(V, 3)``.
-        topology: connectivity of both.
+        topology: connectivity of both, or one for each.
         title: words on top; none by default.
         view: where to look from; by default :func:`view_direction` of the mesh before.
         width: columns of pixels of the file; the number of rows follows from the shape of the mesh.
@@ -51,20 +53,22 @@ def picture_before_after(
         ShapeError: if positions are not one mesh that fits the topology.
         MeshFileError: if the file cannot be written.
     """
-    before, after = one_mesh(before, topology), one_mesh(after, topology)
-    towards_eye, up = view or view_direction(before, topology)
+    topologies = two_topologies(topology)
+    before, after = (one_mesh(v, t) for v, t in zip((before, after), topologies, strict=True))
+    towards_eye, up = view or view_direction(before, topologies[0])
     panel = (width - 2 * MARGIN - GAP) // 2
     camera, size = fit_camera(before, after, towards_eye=towards_eye, up=up, width=panel)
     across = camera.axes[0, 0]
-    mirrored = [face_mirror_directions(vertices, topology, camera)[0] for vertices in (before, after)]
-    stripes = Stripes(across, stripe_frequency(mirrored[0] @ across.to(before), topology))
+    meshes = list(zip((before, after), topologies, strict=True))
+    mirrored = [face_mirror_directions(vertices, topology, camera)[0] for vertices, topology in meshes]
+    stripes = Stripes(across, stripe_frequency(mirrored[0] @ across.to(before), topologies[0]))
 
     row = CAPTION + size[0]
     sheet = Sheet(width, 2 * row + MARGIN, title)
     sheet.note("daylight", MARGIN, sheet.top)
     sheet.note("mirror", MARGIN, sheet.top + row)
-    captions = energy_caption("before", before, topology), energy_caption("after", after, topology, before)
-    for column, (vertices, caption) in enumerate(zip((before, after), captions, strict=True)):
+    captions = energy_caption("before", *meshes[0]), energy_caption("after", *meshes[1], meshes[0])
+    for column, ((vertices, topology), caption) in enumerate(zip(meshes, captions, strict=True)):
         left = MARGIN + column * (panel + GAP)
         mesh = MeshView(vertices, topology, camera, size)
         sheet.caption(caption, left, sheet.top, panel)
@@ -73,3 +77,16 @@ def picture_before_after(
         colors = stripe_colors(stripes(mirrored[column])[:, 0])
         sheet.image(mesh.paint(colors, edges=outline(mesh)), left, sheet.top + row + CAPTION)
     return sheet.write(path, overwrite=overwrite)
+
+
+def two_topologies(topology: Topology | Sequence[Topology]) -> tuple[Topology, Topology]:
+    """Of a mesh before and after.
+
+    Raises:
+        ShapeError: if they are neither one nor two.
+    """
+    if isinstance(topology, Topology):
+        return topology, topology
+    if len(topology) != 2:
+        raise ShapeError("topology", "one of both meshes, or one for each", f"{len(topology)} topologies")
+    return topology[0], topology[1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor
@@ -10,6 +11,7 @@ from torch import Tensor
 from .._one_mesh import one_mesh
 from ..geometry import GaussImage, face_area_vectors, gauss_image
 from ..topology import Topology
+from .picture_before_after import two_topologies
 from .sheet import CAPTION, GAP, MARGIN, Sheet, points
 from .sphere import draw_arcs, draw_points, draw_sphere, fit_sphere_view
 from .view_direction import view_direction
@@ -19,7 +21,7 @@ def picture_gauss_images(
     path: str | os.PathLike[str],
     before: Tensor,
     after: Tensor,
-    topology: Topology,
+    topology: Topology | Sequence[Topology],
     title: str = "",
     *,
     width: int = 1600,
@@ -35,7 +37,7 @@ def picture_gauss_images(
         path: the PNG file.
         before: positions ``(V, 3)``.
         after: positions ``(V, 3)``.
-        topology: connectivity of both.
+        topology: connectivity of both, or one for each.
         title: words on top; none by default.
         width: columns of pixels of the file; the number of rows follows.
         overwrite: whether an existing file may be replaced.
@@ -47,16 +49,17 @@ def picture_gauss_images(
         ShapeError: if positions are not one mesh that fits the topology.
         MeshFileError: if the file cannot be written.
     """
-    before, after = one_mesh(before, topology), one_mesh(after, topology)
-    images = gauss_image(before, topology), gauss_image(after, topology)
-    towards_eye, up = viewpoint(before, topology)
+    first, second = two_topologies(topology)
+    before, after = one_mesh(before, first), one_mesh(after, second)
+    images = gauss_image(before, first), gauss_image(after, second)
+    towards_eye, up = viewpoint(before, first)
     view = fit_sphere_view(*(image.points for image in images), towards_eye=towards_eye, up=up)
     panel = (width - 2 * MARGIN - GAP) // 2
     sheet = Sheet(width, CAPTION + panel + MARGIN, title)
     sheet.note(f"net: {view.net_step}\N{DEGREE SIGN}", MARGIN, sheet.top)
-    strength = min(1.0, (1500 / max(1, topology.num_interior_edges)) ** 0.5)
     for column, (name, image) in enumerate(zip(("before", "after"), images, strict=True)):
         left = MARGIN + column * (panel + GAP)
+        strength = min(1.0, (1500 / max(1, len(image.arcs))) ** 0.5)
         total = f"{_perimeter(image):#.4g}"
         sheet.caption(f"{name}     arcs in total {total} rad", left, sheet.top, panel)
         axes = sheet.axes(left, sheet.top + CAPTION, panel, panel)

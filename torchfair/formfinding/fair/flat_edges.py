@@ -16,6 +16,7 @@ from ...topology import Topology
 from .settings import FairSettings
 
 _ROUNDING = 1e-6  # radians: where every edge is flat, angles are those of rounding
+_BY_CHANCE = 3.0  # times the tolerance: share of the edges of a smooth mesh that are flat by chance, at most
 _STRAIGHT = math.radians(1.0)  # how far from 180 degrees the corner of a panel is no corner
 
 
@@ -34,7 +35,11 @@ def edges_to_keep_flat(vertices: Tensor, topology: Topology, settings: FairSetti
     if chosen == "none":
         return torch.zeros(0, dtype=torch.int64)
     arrive = flat_edges(vertices, topology, settings.flat_tolerance)
-    return arrive if chosen == "all" else arrive[_in_panels(vertices, topology, arrive)]
+    if chosen == "all":
+        return arrive
+    if len(arrive) <= _BY_CHANCE * settings.flat_tolerance * count:
+        return arrive[:0]
+    return arrive[_in_panels(vertices, topology, arrive)]
 
 
 def flat_edges(vertices: Tensor, topology: Topology, tolerance: float) -> Tensor:

@@ -5,24 +5,22 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ...boundary import boundary_pieces
 from ...constraints.gliding import CurveFeet
-from ...geometry.spline_curves import SplineCurves
 from ...projection.layout import State
 from ...topology import Topology
 from ..job.pulls import Pulls
+from .boundary_curves import BoundaryCurves
 
 
 class GlidingBoundary:
-    """Smooth curves through the boundary vertices of a mesh, with its corners, and the vertices that glide on them.
+    """Smooth curves along the boundary of a mesh, and the vertices that glide on them.
 
     Corners and handles do not glide. In the mesh of a state gliding vertices are put on their curves exactly; a term
     that weighs their distance leaves them beside, by a thousandth of an edge or less.
 
     Args:
-        vertices: (V, 3) where the curves go through.
         topology: Connectivity.
-        corners: (V,) bool, boundary vertices at which curves end.
+        rim: The curves, and which vertex is on which.
         pulls: Vertices that are pulled elsewhere do not glide meanwhile.
         planar_faces: (n,) faces that are kept planar, which asks for more digits than that: in the mesh of a state
             their vertices are where the state has them.
@@ -32,22 +30,13 @@ class GlidingBoundary:
         feet: Closest points of gliding vertices on their curves; None where nothing glides.
     """
 
-    def __init__(
-        self, vertices: Tensor, topology: Topology, corners: Tensor, pulls: Pulls, planar_faces: Tensor
-    ) -> None:
-        pieces = boundary_pieces(topology, corners)
+    def __init__(self, topology: Topology, rim: BoundaryCurves, pulls: Pulls, planar_faces: Tensor) -> None:
         self._pulls, self.held = pulls, topology.is_boundary_vertex
-        chosen = torch.nonzero(self.held & ~corners).squeeze(1)
+        chosen = torch.nonzero(rim.owners >= 0).squeeze(1)
         loose = topology.corners[torch.isin(topology.corner_faces, planar_faces)]
         self._loose = torch.isin(chosen, loose)[:, None]
-        self.feet: CurveFeet | None = None
-        if not chosen.numel():
-            return
-        curves = SplineCurves([vertices[piece.vertices] for piece in pieces], [piece.closed for piece in pieces])
-        owners = torch.full((topology.num_vertices,), -1)
-        for number, piece in enumerate(pieces):
-            owners[piece.vertices] = number  # corners belong to two, but do not glide
-        self.feet = CurveFeet(curves, chosen, owners[chosen])
+        curves = rim.splines()
+        self.feet = None if curves is None else CurveFeet(curves, chosen, rim.owners[chosen])
 
     def placed(self, state: State) -> Tensor:
         """The vertices (V, 3) of a state with those that glide put on their curves."""

@@ -56,7 +56,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "area": float(face_areas(vertices, topology).sum()),
         "mean_edge_length": float(Normalisation.of(vertices, topology).length),
         "largest_distance": unit.length * float(distances.max()),
-        "largest_distance_relative": float(distances.max()),
+        "largest_distance_relative": float(distances.max()) / problem.input_edge,
         "largest_distance_back": unit.length * float(back.max()),
         "largest_boundary_distance": unit.length * _largest(strayed),
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),

@@ -21,6 +21,7 @@ from ...topology import Topology
 from ..job.plan import Stage
 from ..job.pulls import Pulls
 from ..references import GivenReference, distances_from, surface_of
+from .boundary_curves import BoundaryCurves
 from .flat_edges import edges_to_keep_flat
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
@@ -49,11 +50,14 @@ class FairProblem:
         reference: Surface to stay close to, normalised, a mesh or a function; by default the start.
         pulls: Handles and held vertices.
         settings: Weights and bounds.
+        rim: Curves along the boundary, normalised; by default through the boundary of the start.
+        input_edge: Mean edge length of the input, in which the distance limit is given; that of the start is 1.
 
     Attributes:
         reference: As a surface with closest points.
         reference_points: (n, 3) points on it: its vertices; of a function those nearest to the vertices and to the
             centres of the faces of the start.
+        input_edge: Mean edge length of the input.
         limits: (V,) largest distances from it; None for no limit.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
         allowed: (V,) the same as they are now: none in design mode, more than ``limits`` on the way back from it.
@@ -71,6 +75,9 @@ class FairProblem:
         reference: GivenReference | None,
         pulls: Pulls,
         settings: FairSettings,
+        *,
+        rim: BoundaryCurves | None = None,
+        input_edge: float = 1.0,
     ) -> None:
         self.vertices, self.topology, self.pulls, self.settings = vertices, topology, pulls, settings
         self.notes: list[str] = []
@@ -78,7 +85,8 @@ class FairProblem:
         self._has_other_reference = reference is not None
         self.forget()
         self.design_mode = self.has_other_goals = False
-        self.corners = boundary_corners(vertices, topology, settings.corner_angle)
+        self.input_edge, self._rim = input_edge, rim or boundary_curves(vertices, topology, settings)
+        self.corners = self._rim.corners
         self.planar_faces = self._planar_faces()
         self.flat_edges = self._flat_edges()
         self.boundary = self._gliding_boundary()
@@ -188,6 +196,12 @@ class FairProblem:
             return {"vertices": vertices}
         return {"vertices": vertices, **c.lifted_normal_variation_blocks(vertices, self.topology)}
 
+    @property
+    def distance_limit(self) -> float | None:
+        """Normalised."""
+        limit = self.settings.distance_limit
+        return None if limit is None else limit * self.input_edge
+
     # ---- decisions -------------------------------------------------------------------------------------
 
     def _reference(self, reference: GivenReference) -> tuple[Reference, Tensor]:
@@ -199,14 +213,14 @@ class FairProblem:
         return surface, closest_on(surface)(places)[0]
 
     def _leaves_reference(self) -> bool:
-        limit, handles = self.settings.distance_limit, self.pulls.vertices
+        limit, handles = self.distance_limit, self.pulls.vertices
         if not handles.numel() or limit is None:
             return False
         farthest = float(distances_from(self.reference, self.pulls.targets[handles]).max())
         if farthest > limit and not self.design_mode:
             self.notes.append(
-                f"a handle pulls {farthest:.3g} mean edge lengths off the reference surface: closeness and the "
-                "distance limit are switched off (design mode)"
+                f"a handle pulls {farthest / self.input_edge:.3g} mean edge lengths off the reference surface: "
+                "closeness and the distance limit are switched off (design mode)"
             )
         return farthest > limit
 
@@ -273,7 +287,7 @@ class FairProblem:
 
     def _limits(self) -> Tensor | None:
         """(V,) largest distances from the reference that are allowed."""
-        limit = self.settings.distance_limit
+        limit = self.distance_limit
         if limit is None:
             return None
         distances = self.distances(self.vertices)
@@ -305,7 +319,7 @@ class FairProblem:
             return None
         beside = self.topology.interior_edge_faces[self.flat_edges].reshape(-1)
         panels = torch.cat([self.planar_faces, beside])
-        return GlidingBoundary(self.vertices, self.topology, self.corners, self.pulls, panels)
+        return GlidingBoundary(self.topology, self._rim, self.pulls, panels)
 
     def _fairness(self) -> list[ElementTerm]:
         weight = self.settings.fairness_weight
@@ -374,3 +388,8 @@ class FairProblem:
 def _raised(weight: float, share: float) -> float:
     """A weight that is imposed by powers of ten, of which all of it has share 1."""
     return max(weight, 1.0) ** share if weight else 0.0
+
+
+def boundary_curves(vertices: Tensor, topology: Topology, settings: FairSettings) -> BoundaryCurves:
+    """Through the boundary of a mesh (V, 3), with corners where the settings see them."""
+    return BoundaryCurves.through(vertices, topology, boundary_corners(vertices, topology, settings.corner_angle))

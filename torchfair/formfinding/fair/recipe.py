@@ -13,9 +13,11 @@ from ...projection.layout import State
 from ...topology import Topology
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference
+from .boundary_curves import BoundaryCurves
 from .measures import fair_measures, fair_promises
 from .plan import FairPlan
-from .problem import FairProblem
+from .problem import FairProblem, boundary_curves
+from .refinement import refined
 from .settings import FairSettings
 
 
@@ -25,6 +27,11 @@ class FairRecipe(Recipe[FairSettings]):
     Args:
         vertices, topology, reference, settings: See :func:`minimise_normal_variation`.
         handles: Likewise; more of them may be pulled later.
+        rim: Curves along the boundary; by default through the boundary of the start.
+        input_edge: Mean edge length in which the distance limit is given; by default that of the start.
+
+    Attributes:
+        reference: The surface to stay close to: vertices and topology, or a function.
     """
 
     name = "fair"
@@ -37,10 +44,23 @@ class FairRecipe(Recipe[FairSettings]):
         reference: GivenReference | None = None,
         handles: Mapping[int, Sequence[float]] | None = None,
         settings: FairSettings | None = None,
+        rim: BoundaryCurves | None = None,
+        input_edge: float | None = None,
     ) -> None:
         super().__init__(vertices, topology, settings or FairSettings())
         surface = None if reference is None else normalised_reference(reference, self.unit)
-        self.problem = FairProblem(self.start, self.topology, surface, self.pulls, self.settings)
+        self.reference = reference or (self.given, self.topology)
+        self.rim = rim or boundary_curves(self.given, self.topology, self.settings)
+        self.input_edge = input_edge or self.unit.length
+        self.problem = FairProblem(
+            self.start,
+            self.topology,
+            surface,
+            self.pulls,
+            self.settings,
+            rim=self.rim.mapped(self.unit.apply),
+            input_edge=self.input_edge / self.unit.length,
+        )
         self.notes = self.problem.notes
         self.pull(handles or {})
 
@@ -96,6 +116,10 @@ class FairRecipe(Recipe[FairSettings]):
         """See ``fair_promises``."""
         return fair_promises(self.problem, before, after)
 
+    def refined(self, state: State) -> FairRecipe:
+        """By Loop's or Catmull and Clark's scheme, near the same reference surface."""
+        return refined(self, self.vertices(state))
+
 
 def minimise_normal_variation(
     vertices: Tensor,
@@ -103,6 +127,7 @@ def minimise_normal_variation(
     *,
     reference: GivenReference | None = None,
     handles: Mapping[int, Sequence[float]] | None = None,
+    levels: int = 0,
     settings: FairSettings | None = None,
     callback: Callback | None = None,
 ) -> JobResult[Level]:
@@ -118,19 +143,22 @@ def minimise_normal_variation(
 
     Args:
         vertices: (V, 3).
-        topology: Connectivity; it does not change.
+        topology: Connectivity; it does not change but by refinement.
         reference: Surface to stay close to, by default the input itself: vertices and topology of a mesh, or a smooth
             surface as a function that gives closest points and unit normals (:func:`torchfair.geometry.closest_on`).
             Vertices that start farther from it than the limit may not go farther away than they are.
         handles: Targets by vertex number. Where a target is farther from the reference surface than the
             limit, the reference is given up (design mode, paper Fig. 12) and a note says so.
+        levels: How often to refine the result and lower E again: triangles by Loop's scheme, others by Catmull and
+            Clark's. Reference and boundary curves stay; handles, and what is planar or flat, are carried on.
         settings: Weights, bounds and tolerances.
         callback: Called with every iteration record, whose quantities hold ``normal_variation``; returning
             True stops. Ctrl-C, or a function that raises KeyboardInterrupt, returns the best mesh so far.
 
     Returns:
-        One level. Its last run is that with the sharp absolute value; the others, if any, are stages with a blunter
-        one, and where handles travel far or faces have to become planar, with constraints imposed step by step.
+        One level for every mesh from coarse to fine. The last run of each is that with the sharp absolute value; the
+        others, if any, are stages with a blunter one, and where handles travel far or faces have to become planar, with
+        constraints imposed step by step.
 
     Raises:
         ShapeError: vertices are not ``(V, 3)``, or a handle is not a point.
@@ -145,4 +173,4 @@ def minimise_normal_variation(
     def begin() -> FairRecipe:
         return FairRecipe(vertices, topology, reference=reference, handles=handles, settings=settings)
 
-    return solved(begin, vertices, callback=callback)
+    return solved(begin, vertices, levels=levels, callback=callback)

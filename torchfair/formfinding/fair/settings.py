@@ -59,7 +59,8 @@ class FairSettings:
         planarity_weight: Weight of half the squared distance of diagonals.
         flat: Edges that stay flat: ``"keep"`` for the diagonals of panels that arrive as coplanar triangles, ``"all"``
             for all edges between triangles that arrive flat, ``"none"``, or numbers of interior edges. Coplanar
-            triangles are a panel if no vertex lies among them, and more than they hang together.
+            triangles are a panel if no vertex lies among them, and more than they hang together; there are none if no
+            more edges are flat than by chance.
         flat_tolerance: An edge arrives flat when its angle is at most this fraction of the mean angle of all edges.
         flat_weight: Weight of half of squared ``l l*`` of edges kept flat; where they are not flat enough it is raised.
         smallest_angle: No corner angle falls below this (or below the smallest of the input), radians.
@@ -85,7 +86,7 @@ class FairSettings:
     planar_tolerance: float = 1e-3
     planarity_weight: float = 1e6
     flat: Flat | tuple[int, ...] = "keep"
-    flat_tolerance: float = 1e-2
+    flat_tolerance: float = 1e-3
     flat_weight: float = 1e4
     smallest_angle: float = setting(math.radians(10.0), unit="radians")
     smallest_area: float = 0.2

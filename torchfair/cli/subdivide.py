@@ -1,0 +1,121 @@
+"""``torchfair subdivide``: a finer mesh, with the marks on its edges carried along."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .arguments import non_negative, positive_count
+from .errors import CommandError
+from .inputs import add_repair, read_input
+from .outputs import refuse_existing, refuse_unknown_format
+from .symmetric_inputs import labels_beside
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from ..io import PolygonMesh
+    from ..subdivision import Refinement
+
+NAME = "torchfair subdivide"
+_DESCRIPTION = (
+    "Cuts every triangle into four triangles and every other face into quads, and moves the vertices by the rules of "
+    "the scheme. Edges that are marked in INPUT (line elements of an OBJ file, or NAME.edges.json beside another) are "
+    "marked in OUTPUT."
+)
+_SCHEMES = ("loop", "catmull-clark", "hybrid", "midpoint")
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds ``subdivide`` to the commands."""
+    parser: argparse.ArgumentParser = subparsers.add_parser(
+        "subdivide", help="refine a mesh", description=_DESCRIPTION, allow_abbrev=False
+    )
+    add = parser.add_argument
+    add("input", metavar="INPUT", help="mesh file, or a built-in example:NAME")
+    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
+    add("--scheme", choices=_SCHEMES, default="hybrid", help="loop for triangles; catmull-clark; hybrid, which is loop "
+        "on triangles and catmull-clark on other faces; or midpoint, which moves nothing (default hybrid)")  # fmt: skip
+    add("--levels", type=positive_count, default=1, metavar="N", help="how often (default 1)")
+    add("--boundary", choices=("curve", "interpolate", "polyline"), default="curve", help="smooth the boundary, pass "
+        "through its vertices, or keep its edges straight (default curve)")  # fmt: skip
+    add("--corner-angle", type=non_negative, default=40.0, metavar="DEGREES", help="boundary vertices where it turns "
+        "by more than this stay (default 40)")  # fmt: skip
+    add("--labels", metavar="FILE", help="OBJ or JSON file that marks edges (default: INPUT if it marks any)")
+    add("--lines", choices=("auto", "parallel", "along"), default="auto", help="mark parts of marked edges alone "
+        "(along), or edges parallel to them inside faces too, as for principal edges (parallel); by default parallel "
+        "where marks are principal edges of a triangle mesh")  # fmt: skip
+    add("--force", action="store_true", help="replace files that exist")
+    add_repair(parser)
+    parser.set_defaults(run=run, name=NAME)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Reads, refines, writes."""
+    from ..boundary import boundary_corners
+    from ..io import save_mesh
+    from ..polylines import polylines_along
+    from ..subdivision import refine
+
+    output = Path(arguments.output)
+    refuse_unknown_format(output)
+    in_mesh = output.suffix.lower() == ".obj"
+    beside = output.with_suffix(".edges.json")
+    refuse_existing([output], force=arguments.force)
+    mesh = read_input(arguments.input, arguments.repair)
+    marks = _marks(arguments, mesh)
+    if marks is not None and not in_mesh:
+        refuse_existing([beside], force=arguments.force)
+    scheme: Any = arguments.scheme.replace("-", "_")
+    corners = boundary_corners(mesh.vertices, mesh.topology, math.radians(arguments.corner_angle))
+    step = refine(mesh.topology, scheme, arguments.levels, boundary=arguments.boundary, corners=corners)
+    lines, notes = [], [f"repaired: {sentence}" for sentence in mesh.repairs]
+    written = [output]
+    output.parent.mkdir(parents=True, exist_ok=True)
+    fine = None
+    if marks is not None:
+        fine, note = _carried(arguments.lines, mesh, marks, step)
+        notes.append(note)
+        lines = polylines_along(step.topology, fine) if in_mesh else []
+    vertices = step.apply(mesh.vertices)
+    save_mesh(output, vertices, step.topology, overwrite=arguments.force, polylines=lines)
+    if fine is not None and not in_mesh:
+        from ..io import save_edge_labels
+
+        save_edge_labels(beside, step.topology, fine, overwrite=arguments.force)
+        written.append(beside)
+    counts = [f"{t.num_vertices} vertices, {t.num_faces} faces" for t in (mesh.topology, step.topology)]
+    print("\n".join([*notes, f"{counts[0]} to {counts[1]}", *(f"wrote {path}" for path in written)]))
+    return 0
+
+
+def _marks(arguments: argparse.Namespace, mesh: PolygonMesh) -> Tensor | None:
+    """(E,) bool: marked edges; None if there are none."""
+    from ..io import load_edge_labels
+
+    file = arguments.labels or labels_beside(arguments.input)
+    if file is None:
+        return None
+    if mesh.repairs:
+        raise CommandError("--repair: marks of edges are for the vertex numbers of the file; write it repaired first")
+    return load_edge_labels(file, mesh.topology)
+
+
+def _carried(lines: str, mesh: PolygonMesh, marks: Tensor, step: Refinement) -> tuple[Tensor, str]:
+    """Marks of the finer mesh, and what was decided, in words."""
+    parallel = lines == "parallel" or (lines == "auto" and _are_principal(mesh, marks))
+    fine = step.carry_edge_labels(marks, parallel=parallel)
+    words = "parts of marked edges and edges parallel to them" if parallel else "parts of marked edges"
+    return fine, f"{int(marks.sum())} marked edges to {int(fine.sum())}: {words}"
+
+
+def _are_principal(mesh: PolygonMesh, marks: Tensor) -> bool:
+    """Whether two opposite edges are marked at every regular vertex of a triangle mesh."""
+    from ..principal import PrincipalEdges
+
+    if not mesh.topology.is_triangular:
+        return False
+    edges = PrincipalEdges(mesh.topology, marks)
+    return bool(edges.stars().vertices.numel()) and not edges.exceptions.numel()

@@ -1,0 +1,61 @@
+"""Quad meshes as input of ``torchfair symmetric``: cut by diagonals that lean to one side and the other in turn."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from .errors import CommandError
+from .symmetric_inputs import joined_edge, labels_beside
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from ..io import PolygonMesh
+    from ..principal import PrincipalEdges
+
+_EVENNESS = 3.0
+
+
+def read_quads(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[PrincipalEdges, Tensor, list[str]]:
+    """Principal edges, positions (V, 3) to start from, and what was decided, in words."""
+    from ..principal import half_shifted, triangles_from_quads
+
+    seed, note = _seed(arguments, mesh)
+    edges = triangles_from_quads(mesh.vertices, mesh.topology, seed)
+    cut = f"{mesh.topology.num_faces} quads are cut by diagonals in alternating rows, which start half an edge apart"
+    return edges, half_shifted(mesh.vertices, mesh.topology, edges), [cut, note]
+
+
+def even_settings(arguments: argparse.Namespace, settings: Any) -> Any:
+    """Settings that keep stars of cut quads even, unless something else was asked for."""
+    if settings.evenness_weight or hasattr(arguments, "settings.evenness_weight"):
+        return settings
+    return replace(settings, evenness_weight=_EVENNESS)
+
+
+def _seed(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[int | None, str]:
+    """A principal edge, if one is named or marked, and what was decided, in words."""
+    from ..io import load_edge_labels
+    from ..principal import triangles_from_quads
+
+    if arguments.seed is not None:
+        return joined_edge(arguments.seed, mesh), "principal edges are those in line with the seed"
+    file = arguments.labels or labels_beside(arguments.input)
+    if file is None:
+        return None, "principal edges are the family of edges that bends less out of the surface"
+    marked = load_edge_labels(file, mesh.topology)
+    numbers = marked.nonzero().squeeze(1)
+    if not numbers.numel():
+        raise CommandError(f"--labels: {file} marks no edge")
+    seed = int(numbers[0])
+    family = triangles_from_quads(mesh.vertices, mesh.topology, seed)
+    known = {frozenset(pair) for pair in family.topology.edges[family.mask].tolist()}
+    strange = [pair for pair in mesh.topology.edges[marked].tolist() if frozenset(pair) not in known]
+    if strange:
+        raise CommandError(
+            f"--labels: {file} marks edges of both families of the quads, such as {mesh.topology.edges[seed].tolist()} "
+            f"and {strange[0]}: mark one of them, or give --seed"
+        )
+    return seed, f"principal edges are those marked in {file} and in line with them"
