@@ -36,9 +36,9 @@ def start_surface(curves: Sequence[ClosedCurve], count: int = 1000) -> tuple[Ten
     Regular triangles where they do: in one curve a disk around a centre, all inner vertices of valence 6; between two
     an annulus of staggered rows, the second curve either way round. Where faces of these would turn over, be flat, or
     run through each other, even triangles: over the plan, if the curves are seen from somewhere without crossings
-    (curves inside others are holes there, and no part of the mesh can meet another one); on the surface of least area between
-    points of the rim (one curve); on the band of least area (two); on the convex hull (several). Boundary vertices are
-    evenly spaced, more closely where the rim is narrow, corners among them.
+    (curves inside others are holes there, and no part of the mesh can meet another one); on the surface of least area
+    between points of the rim (one curve); on the band of least area (two); on the convex hull (several). Boundary
+    vertices are evenly spaced, more closely where the rim is narrow, corners among them.
 
     No angle is below 15 degrees, unless a corner of a rim is.
 
