@@ -95,7 +95,7 @@ REFUSED = {
     "nothing to start from": ([], "--curve"),
     "missing mesh": (["none.obj"], "none.obj"),
     "missing curve": (["--curve", "none.xyz"], "none.xyz"),
-    "three curves": (["--curve", "CIRCLE"] * 1 + ["--curve", "CIRCLE", "--curve", "CIRCLE"], "disk"),
+    "same curve twice": (["--curve", "CIRCLE"] * 2, "the same"),
     "two numbers": (["--curve", "TWO"], "line 2"),
     "no numbers": (["--curve", "WORDS"], "line"),
     "bad boundary": (["--curve", "CIRCLE", "--boundary", "loose"], "loose"),

@@ -325,10 +325,10 @@ def test_bad_requests_are_refused() -> None:
         FormSettings(smoothing=3.0)
 
 
-@pytest.mark.parametrize("count", [7, 50, 1000])
+@pytest.mark.parametrize("count", [7, 57, 1000])
 def test_start_disks_have_valence_six_and_good_faces(count: int) -> None:
     vertices, topology = start_surface([wave()], count)
-    assert topology.num_vertices == pytest.approx(count, rel=0.35)
+    assert topology.num_vertices == pytest.approx(count, rel=0.1)
     assert topology.num_vertices - topology.num_edges + topology.num_faces == 1
     assert set(topology.valences[~topology.is_boundary_vertex].tolist()) <= {6}
     assert bool((face_areas(vertices, topology) > 0).all())
@@ -346,7 +346,7 @@ def test_start_annuli_join_curves_of_either_direction() -> None:
 
 
 def test_start_surfaces_refuse_what_they_cannot_join() -> None:
-    with pytest.raises(MeshError, match="disk"):
+    with pytest.raises(MeshError, match="got none"):
         start_surface([])
     with pytest.raises(MeshError, match="at least 7"):
         start_surface([wave()], 3)

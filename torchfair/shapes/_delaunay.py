@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -101,11 +102,11 @@ def _closes_on_itself(faces: Ints, tiles: Ints) -> bool:
 _ROUNDS = 200
 
 
-def flip_to_delaunay(vertices: Points, faces: Ints) -> Ints:
+def flip_to_delaunay(vertices: Points, faces: Ints, right: Callable[[Points, Ints], Mask] | None = None) -> Ints:
     """Flips interior edges whose two opposite angles, measured in space, add up to more than 180 degrees.
 
     Every round flips a set of edges no two of which share a face; it ends when there are none. An edge is not
-    flipped onto an existing one.
+    flipped onto an existing one, nor where ``right`` (vertices and faces to a mask) is False of a face that comes.
     """
     faces = faces.copy()
     for _ in range(_ROUNDS):
@@ -117,6 +118,9 @@ def flip_to_delaunay(vertices: Points, faces: Ints) -> Ints:
         n = len(vertices)
         existing = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         candidates = candidates[~np.isin(new @ [n, 1], existing @ [n, 1])]
+        if right is not None:
+            v, w, a, b = flaps[candidates].T
+            candidates = candidates[right(vertices, np.stack([v, b, a], 1)) & right(vertices, np.stack([b, w, a], 1))]
         if not candidates.size:
             break
         rank = np.full(len(faces), len(candidates))

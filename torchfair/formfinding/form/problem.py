@@ -51,6 +51,11 @@ class FormProblem:
         return staying_vertices(self.topology, self._track, self.settings) | self.pulls.held
 
     @property
+    def length(self) -> float:
+        """One mean edge length, in the unit of the input."""
+        return self._normalisation.length
+
+    @property
     def glides(self) -> bool:
         """Whether boundary vertices slide along their curves."""
         return self.settings.boundary == "glide"

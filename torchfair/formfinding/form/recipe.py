@@ -9,19 +9,22 @@ from torch import Tensor
 
 from ...curves import ClosedCurve
 from ...energies import total_absolute_curvature
+from ...errors import SettingsError
 from ...projection import Callback
 from ...projection.layout import State
 from ...subdivision import catmull_clark, loop
 from ...topology import Topology
 from ...triangulation import triangulate
 from ..handles import refuse_unreachable_handles
-from ..job import JobResult, Level, Promise, Recipe, Stage, solved
+from ..job import JobResult, Level, Plan, Promise, Recipe, Stage, solved
 from .follower import FormFollower, SettlingPlan
 from .measures import form_measures, form_promises
+from .other_starts import Start, other_starts
 from .plan import FormPlan
 from .problem import FormProblem, staying_vertices
-from .rim import Rim
+from .rim import Rim, check_rim
 from .settings import FormSettings
+from .several_starts import FAR, SeveralStarts
 
 
 class FormRecipe(Recipe[FormSettings]):
@@ -32,6 +35,7 @@ class FormRecipe(Recipe[FormSettings]):
         handles: Likewise; more of them may be pulled later.
         rim: Curves and normals of a coarser mesh, carried on to its refinement, instead of ``curves`` and ``normals``;
             the vertices are then taken to be near the solution.
+        starts: See :func:`minimise_absolute_curvature`.
 
     Attributes:
         rim: What is asked along the boundary.
@@ -49,8 +53,11 @@ class FormRecipe(Recipe[FormSettings]):
         handles: Mapping[int, Sequence[float]] | None = None,
         settings: FormSettings | None = None,
         rim: Rim | None = None,
+        starts: int = 1,
     ) -> None:
         super().__init__(vertices, topology, settings or FormSettings())
+        check_rim(self.given, self.topology, curves)
+        self._starts = starts
         self._input, self._nearby, topology = self.given, rim is not None, self.topology
         self.rim = rim or Rim.of(self.given, topology, curves, normals, self.settings.corner_angle)
         self.start_at(self.rim.track.positions(self.given))
@@ -71,10 +78,15 @@ class FormRecipe(Recipe[FormSettings]):
         """Refuses handles on a boundary that stays, away from where they are."""
         refuse_unreachable_handles(vertices, targets, self.given, self.stays())
 
-    def plan(self, state: State) -> FormPlan:
-        """Along normals with decreasing smoothing, then in space."""
+    def plan(self, state: State) -> Plan:
+        """Along normals with decreasing smoothing, then in space; from several starts where there are some."""
         self._follower.forget()
-        return FormPlan(self.problem, state, nearby=self._nearby)
+        far = bool(self.pulls.pulled.any()) and float(self.pulls.away(state["vertices"]).max()) > FAR
+        if self._nearby or self.settings.formulation == "lifted" or not (self._starts > 1 or far):
+            return FormPlan(self.problem, state, nearby=self._nearby)
+        given = Start("as given", state["vertices"])
+        others = other_starts(given.vertices, self.problem.topology, self._starts - 1) if self._starts > 1 else []
+        return SeveralStarts(self.problem, [given, *others], self.notes.append)
 
     def predicted(self, state: State) -> State:
         """Cones around handles."""
@@ -150,6 +162,7 @@ def minimise_absolute_curvature(
     normals: Tensor | None = None,
     handles: Mapping[int, Sequence[float]] | None = None,
     levels: int = 0,
+    starts: int = 1,
     settings: FormSettings | None = None,
     callback: Callback | None = None,
 ) -> JobResult[Level]:
@@ -161,7 +174,8 @@ def minimise_absolute_curvature(
     The merit never increases within a stage. The problem is solved centred and with unit mean edge length, so
     results do not depend on the unit.
 
-    Minimisers are not unique: the start decides, among other things, between a cone and two cones tip to tip.
+    Minimisers are not unique: the start decides, among other things, between a cone and two cones tip to tip. So it
+    is worth trying several (``starts``).
 
     Promises, which are measured on the result (:attr:`~torchfair.formfinding.JobResult.promises`): the boundary is on
     its curves; handles are within 0.05 mean edges of their targets; prescribed tangent planes are met within a degree;
@@ -178,6 +192,10 @@ def minimise_absolute_curvature(
             They point to the side from which faces run counterclockwise.
         handles: Places to pass through, by vertex number.
         levels: How often to refine.
+        starts: From how many surfaces to start, the given one first: others have its boundary and connectivity and lie
+            on its convex hull, above and below, are bumped up and down, of least area, or have random bumps. The best
+            is refined; all are listed with their C in the notes. Where a handle is farther than a mean edge from its
+            vertex, the surface is also made to follow it in small steps.
         settings: Weights, smoothing and tolerances.
         callback: Called with every iteration record, whose quantities hold ``total_absolute_curvature``; returning
             True stops. Ctrl-C, or a function that raises KeyboardInterrupt, returns the best mesh so far, on the finest
@@ -188,8 +206,9 @@ def minimise_absolute_curvature(
 
     Raises:
         ShapeError: vertices or normals are not ``(V, 3)``, or a handle is not a point.
-        MeshError: vertices are not finite, a face has no area, curves do not fit the boundary, or a handle is
-            no vertex or pulls a vertex of the boundary that stays.
+        MeshError: vertices are not finite, a face has no area, the mesh is closed, curves cross or do not fit the
+            boundary, or a handle is no vertex or pulls a vertex of the boundary that stays.
+        SettingsError: ``starts`` is below 1.
 
     Example::
 
@@ -197,8 +216,12 @@ def minimise_absolute_curvature(
         result = minimise_absolute_curvature(vertices, topology, curves=[curve], levels=1)
         print(result.after["total_absolute_curvature"], result.holds)
     """
+    if starts < 1:
+        raise SettingsError(f"starts must be at least 1, got {starts}")
 
     def begin() -> FormRecipe:
-        return FormRecipe(vertices, topology, curves=curves, normals=normals, handles=handles, settings=settings)
+        return FormRecipe(
+            vertices, topology, curves=curves, normals=normals, handles=handles, settings=settings, starts=starts
+        )
 
     return solved(begin, vertices, levels=levels, callback=callback)

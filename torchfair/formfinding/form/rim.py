@@ -13,6 +13,10 @@ from ...errors import MeshError, ShapeError
 from ...subdivision import Refinement
 from ...topology import Topology
 from .boundary_track import BoundaryTrack, new_boundary_vertices
+from .starting.rims import refuse_crossing_rims
+
+_SAMPLES = 200  # of a curve
+_NEAR = 0.25  # of the extent of a boundary loop
 
 
 class Rim(NamedTuple):
@@ -54,6 +58,37 @@ class Rim(NamedTuple):
         """The vertices (V, 3), those of the boundary in their places or, gliding, in the nearest on the curves."""
         track = self.track.updated(vertices) if glides else self.track
         return track.positions(vertices)
+
+
+def check_rim(vertices: Tensor, topology: Topology, curves: Sequence[ClosedCurve] | None) -> None:
+    """Refuses surfaces without a boundary, and curves that no boundary can follow or that this one does not.
+
+    Raises:
+        MeshError: the mesh is closed; curves cross, touch or repeat themselves or each other; or a curve is farther
+            from its boundary loop than a quarter of the extent of the loop.
+    """
+    if not len(topology.boundary_loops()):
+        raise MeshError(
+            "the mesh is closed: C of a closed surface is least when it has collapsed. Give a mesh with a boundary, or "
+            "boundary curves"
+        )
+    if curves is None:
+        return
+    refuse_crossing_rims(curves)
+    track = BoundaryTrack.onto(vertices, topology, curves)
+    for number, loop in enumerate(topology.boundary_loops()):
+        points, curve = vertices[loop], track.curves[number]
+        extent = float(torch.linalg.vector_norm(points.amax(0) - points.amin(0)))
+        samples = curve.at(curve.spaced(max(_SAMPLES, len(curve.corners))))
+        there = torch.linalg.vector_norm(curve.at(track.parameters[loop]) - points, dim=1).max()
+        back = torch.cdist(samples, points).amin(1).max()
+        away = max(float(there), float(back))
+        if away > _NEAR * extent:
+            raise MeshError(
+                f"curve {list(curves).index(curve)} (counted from 0) is not the boundary of the mesh: they are up to "
+                f"{away:.4g} apart, the boundary is {extent:.4g} across. Leave the mesh out to start from the curves "
+                "alone, or give the curve of this boundary, in the unit of the mesh"
+            )
 
 
 def _unit_normals(normals: Tensor | None, topology: Topology) -> Tensor:

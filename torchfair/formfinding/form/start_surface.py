@@ -1,135 +1,127 @@
-"""Start surfaces from boundary curves alone: a disk in one curve, an annulus between two."""
+"""Start surfaces from boundary curves alone: a disk in one curve, an annulus between two, more holes between more."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from ..._graph import graph_laplacian
 from ...curves import ClosedCurve
 from ...errors import MeshError
-from ...linear import factorise
+from ...geometry import corner_angles, dihedral_angles, face_area_vectors
+from ...self_intersections import self_intersections
 from ...topology import Topology
+from .starting.lattices import hexagonal_disk, staggered_annulus
+from .starting.patch import Patch
+from .starting.rims import refuse_crossing_rims
+from .starting.spanning import spanning_patches
 
-_TURNS = 360  # places of the second curve that are tried against the first
+_LEAST_ANGLE = math.radians(15.0)  # of a start
+_STEEPEST = math.radians(100.0)  # between neighbouring faces
+_COUNT = 0.1  # relative
+
+
+class _Start(NamedTuple):
+    vertices: Tensor
+    topology: Topology
+    regular: bool
 
 
 def start_surface(curves: Sequence[ClosedCurve], count: int = 1000) -> tuple[Tensor, Topology]:
-    """A triangle mesh of about ``count`` vertices between given boundary curves.
+    """A triangle mesh of about ``count`` vertices between given boundary curves, without folds.
 
-    One curve: a disk of triangles around a centre, all inner vertices of valence 6, each in the mean of its
-    neighbours. Two curves: an annulus of staggered rows on the straight lines between them, which start where the
-    lines are shortest; the second curve may run either way round. Boundary vertices are evenly spaced, corners
-    among them.
+    Regular triangles where they do: in one curve a disk around a centre, all inner vertices of valence 6; between two
+    an annulus of staggered rows, the second curve either way round. Where faces of these would turn over, be flat, or
+    run through each other, even triangles: over the plan, if the curves are seen from somewhere without crossings
+    (curves inside others are holes there, and no part of the mesh can meet another one); on the surface of least area
+    between points of the rim (one curve); on the band of least area (two); on the convex hull (several). Boundary
+    vertices are evenly spaced, more closely where the rim is narrow, corners among them.
+
+    No angle is below 15 degrees, unless a corner of a rim is.
 
     Args:
-        curves: One or two closed curves.
-        count: Wanted number of vertices.
+        curves: Closed curves that do not meet.
+        count: Wanted number of vertices, met within a tenth unless the rims need more.
 
     Returns:
         vertices (V, 3) float64, topology. Faces run counterclockwise with the first curve, so normals of a disk
         point to where that is seen to run counterclockwise.
 
     Raises:
-        MeshError: another number of curves, a count below 7, or too many corners for it.
+        MeshError: no curve, a count below 7, curves that cross, touch or repeat themselves or each other, or no
+            surface is found.
     """
     if count < 7:
         raise MeshError(f"a start surface needs at least 7 vertices, got count = {count}")
+    if not curves:
+        raise MeshError("a start surface is made from one boundary curve or several, got none: give curves, or a mesh")
+    refuse_crossing_rims(curves)
+    best, least = None, -math.inf
+    for start in _candidates(curves, count):
+        worth = _worth(start, count)
+        if worth >= 1.0:
+            return start.vertices, start.topology
+        if worth > least:
+            best, least = start, worth
+    if best is None:
+        raise MeshError(
+            f"no start surface is found between these {len(curves)} curves: they are neither seen from one side "
+            "without crossings nor on a common convex hull. Give a mesh to start from"
+        )
+    return best.vertices, best.topology
+
+
+def _candidates(curves: Sequence[ClosedCurve], count: int) -> Iterator[_Start]:
     if len(curves) == 1:
-        return _disk(curves[0], count)
-    if len(curves) == 2:
-        return _annulus(curves[0], curves[1], count)
-    raise MeshError(f"a start surface is made from one curve (disk) or two (annulus), got {len(curves)}: give a mesh")
+        yield _Start(*hexagonal_disk(curves[0], count), True)
+    elif len(curves) == 2:
+        yield _Start(*staggered_annulus(curves[0], curves[1], count), True)
+    for patch in spanning_patches(curves, count):
+        yield _Start(torch.from_numpy(patch.points), _oriented(patch), False)
 
 
-def _disk(curve: ClosedCurve, count: int) -> tuple[Tensor, Topology]:
-    rings = max(1, round((math.sqrt(12.0 * count - 3.0) - 3.0) / 6.0))  # 1 + 3 n (n + 1) vertices
-    while 6 * rings < len(curve.corners):
-        rings += 1
-    topology = Topology.from_faces(_hexagon(rings))
-    vertices = torch.zeros(topology.num_vertices, 3, dtype=torch.float64)
-    edge = topology.num_vertices - 6 * rings
-    vertices[edge:] = curve.at(curve.spaced(6 * rings))
-    return _harmonic(vertices, topology), topology
+def _oriented(patch: Patch) -> Topology:
+    """Faces that have the edges of the first curve in its direction."""
+    faces = torch.from_numpy(patch.faces)
+    on_rim = torch.from_numpy(patch.rims == 0)
+    topology = Topology.from_faces(faces, len(patch.points))
+    parameters = torch.from_numpy(patch.parameters)
+    for loop in topology.boundary_loops():
+        if bool(on_rim[loop[0]]):
+            ahead = torch.remainder(parameters[loop.roll(-1)] - parameters[loop] + 0.5, 1.0) - 0.5
+            return topology if float(ahead.sum()) > 0.0 else Topology.from_faces(faces.flip(1), len(patch.points))
+    return topology
 
 
-def _hexagon(rings: int) -> np.ndarray:
-    """Triangles (F, 3) of a hexagon of the triangular lattice; ring j holds 6 j vertices, the outermost last."""
-    faces = []
-    first = [0, *(1 + 3 * j * (j - 1) for j in range(1, rings + 1))]
-    for j in range(1, rings + 1):
-        inner, outer = first[j - 1], first[j]
-        inside, outside = max(6 * (j - 1), 1), 6 * j
-        side, step = np.divmod(np.arange(outside), j)
-        below = inner + (side * (j - 1) + np.minimum(step, j - 1)) % inside
-        here, following = outer + np.arange(outside), outer + (np.arange(outside) + 1) % outside
-        faces.append(np.stack([below, here, following], 1))
-        if j > 1:
-            side, step = np.divmod(np.arange(inside), j - 1)
-            ahead = outer + side * j + step + 1
-            faces.append(np.stack([inner + np.arange(inside), ahead, inner + (np.arange(inside) + 1) % inside], 1))
-    return np.concatenate(faces)
+def _worth(start: _Start, count: int) -> float:
+    """At least 1 for a start that will do, less for others, the less the worse."""
+    vertices, topology, regular = start
+    wanted = min(_LEAST_ANGLE, 0.5 * _sharpest_corner(vertices, topology))
+    worth = min(1.0, float(corner_angles(vertices, topology).min()) / wanted)
+    if regular and abs(topology.num_vertices / count - 1.0) > _COUNT:
+        worth = min(worth, 0.9)
+    if regular and _seen_from_one_side(vertices, topology):
+        return worth
+    steepest = float(dihedral_angles(vertices, topology).abs().max()) if topology.num_interior_edges else 0.0
+    worth = min(worth, 1.0 - (steepest - _STEEPEST)) if steepest > _STEEPEST else worth
+    return worth - 1.0 if len(self_intersections(vertices, topology)) else worth
 
 
-def _annulus(first: ClosedCurve, second: ClosedCurve, count: int) -> tuple[Tensor, Topology]:
-    around = 0.5 * (first.length + second.length)
-    bottom, top = _matched(first, second, _TURNS)
-    width = float((first.at(bottom) - second.at(top)).norm(dim=1).mean())
-    edge = math.sqrt(around * width / count * 2.0 / math.sqrt(3.0))
-    columns = max(6, len(first.corners), len(second.corners), round(around / edge))
-    rows = max(2, 2 * round(0.5 * (count / columns - 1.0)))  # even, so that neither curve has a shifted row
-    bottom, top = _matched(first, second, columns)
-    places = []
-    for row in range(rows + 1):
-        shift = 0.5 * (row % 2)
-        ends = (first.at(_between(bottom, shift)), second.at(_between(top, shift)))
-        places.append(ends[0].lerp(ends[1], row / rows))
-    return torch.cat(places), Topology.from_faces(_rows(rows, columns))
+def _seen_from_one_side(vertices: Tensor, topology: Topology) -> bool:
+    """Whether no face of a disk turns over as it is seen along its area vector: then none meets another one."""
+    areas = face_area_vectors(vertices, topology)
+    return len(topology.boundary_loops()) == 1 and bool((areas @ areas.sum(0) > 0.0).all())
 
 
-def _matched(first: ClosedCurve, second: ClosedCurve, count: int) -> tuple[Tensor, Tensor]:
-    """Parameters (count,) on both curves, of either direction on the second, that lie as near as possible."""
-    bottom, top = first.spaced(count), second.spaced(count)
-    points, best, nearest = first.at(bottom), top, math.inf
-    for candidate in (top, top.flip(0)):
-        places = second.at(candidate)
-        gaps = [float((points - places.roll(shift, 0)).square().sum()) for shift in range(count)]
-        if min(gaps) < nearest:
-            nearest, best = min(gaps), candidate.roll(int(np.argmin(gaps)), 0)
-    return bottom, best
-
-
-def _between(parameters: Tensor, shift: float) -> Tensor:
-    """Parameters shifted by a fraction of the way to the next ones, around the circle."""
-    ahead = torch.remainder(parameters.roll(-1, 0) - parameters + 0.5, 1.0) - 0.5
-    return parameters + shift * ahead
-
-
-def _rows(rows: int, columns: int) -> np.ndarray:
-    """Triangles between rows, of which every second one is shifted by half a cell."""
-    i = np.arange(columns)
-    after = (i + 1) % columns
-    faces = []
-    for row in range(rows):
-        a, b = row * columns + i, row * columns + after
-        c, d = a + columns, b + columns
-        pairs = ((a, b, c), (b, d, c)) if row % 2 == 0 else ((a, b, d), (a, d, c))
-        faces += [np.stack(triangle, 1) for triangle in pairs]
-    return np.concatenate(faces)
-
-
-def _harmonic(vertices: Tensor, topology: Topology) -> Tensor:
-    """Puts every inner vertex in the mean of its neighbours; boundary vertices stay."""
-    free = np.flatnonzero(~topology.is_boundary_vertex.numpy())
-    held = np.flatnonzero(topology.is_boundary_vertex.numpy())
-    rows = graph_laplacian(topology)[free]
-    if not free.size:
-        return vertices.clone()
-    pulls = torch.from_numpy(-(rows[:, held] @ vertices[held].numpy()))
-    result = vertices.clone()
-    result[free] = factorise(rows[:, free]).solve(pulls).values
+def _sharpest_corner(vertices: Tensor, topology: Topology) -> float:
+    """The smallest angle between two boundary edges, radians: no triangle there has a larger one."""
+    result = math.pi
+    for loop in topology.boundary_loops():
+        place = vertices[loop]
+        ahead, back = place.roll(-1, 0) - place, place.roll(1, 0) - place
+        sine = torch.linalg.vector_norm(torch.linalg.cross(ahead, back), dim=1)
+        result = min(result, float(torch.atan2(sine, (ahead * back).sum(1)).min()))
     return result
