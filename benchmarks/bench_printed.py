@@ -61,6 +61,7 @@ def fair_ladder() -> Iterator[tuple[str, FairSettings]]:
         closeness_weight=ours.closeness_weight,
         fairness_weight=ours.fairness_weight,
         boundary_weight=ours.boundary_weight,
+        flat_weight=ours.flat_weight,
         constraint_weight=ours.constraint_weight,
         projection=replace(settings.projection, initial_damping=ours.projection.initial_damping, max_iterations=80),
     )

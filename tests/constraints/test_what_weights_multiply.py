@@ -19,7 +19,7 @@ from torchfair import Topology
 from torchfair import constraints as c
 from torchfair.energies import normal_variation, polyline_fairness, umbrella_fairness
 from torchfair.formfinding import DenoiseSettings, FairSettings, FormSettings, SymmetricSettings
-from torchfair.geometry import ReferenceSurface
+from torchfair.geometry import ReferenceSurface, dual_edge_lengths, edge_lengths
 from torchfair.polylines import straight_triples
 from torchfair.projection import ElementTerm
 from torchfair.projection.layout import State
@@ -145,6 +145,24 @@ def _() -> Whole:
     corners = torch.tensor([[0.0, 0, 0], [1, 0, 0.3], [1, 1, 0], [0, 1, 0.3]], dtype=DOUBLE)  # diagonals 0.3 apart
     topology = Topology.from_faces([[0, 1, 2, 3]])
     return c.planarity_terms(topology, torch.tensor([0]), weight=WEIGHT), {"vertices": corners}, 0.3**2
+
+
+@row("`flat_weight`")
+def _() -> Whole:
+    vertices, topology = triangles(CPU)
+    chosen, count = torch.arange(0, topology.num_interior_edges, 3), topology.num_interior_edges
+    products = edge_lengths(vertices, topology)[:count] * dual_edge_lengths(vertices, topology)
+    terms = c.flat_edge_terms(topology, chosen, weight=WEIGHT)
+    return terms, {"vertices": vertices}, float(products[chosen].square().sum())
+
+
+@row("`flat_weight`")
+def _() -> Whole:
+    vertices, topology = triangles(CPU)
+    state = {"vertices": vertices, **c.lifted_normal_variation_blocks(vertices, topology)}
+    chosen = torch.arange(0, topology.num_interior_edges, 3)
+    terms = c.lifted_flat_edge_terms(topology, chosen, weight=WEIGHT)
+    return terms, state, 2.0 * float(dual_edge_lengths(vertices, topology)[chosen].square().sum())
 
 
 @row("`quality_weight`")

@@ -49,7 +49,7 @@ def second_difference(x: Tensor) -> Tensor:
 def interior_fairness_terms(topology: Topology, *, weight: float, block: str = "vertices") -> list[ElementTerm]:
     """Second differences at interior vertices between four quads, umbrella vectors at the others.
 
-    The weight multiplies half the squares of :func:`second_difference`, so an eighth of ``|v_- - 2 v + v_+|^2``, and
+    The weight multiplies an eighth of ``|v_- - 2 v + v_+|^2``, half the square of an umbrella of two neighbours, and
     half the squared umbrella vectors.
     """
     in_grid = _between_quads(topology)

@@ -115,7 +115,7 @@ def lifted_absolute_curvature_terms(
     constraint_weight: float = 1e3,
     absolute: Callable[[float], Loss] = SmoothAbsolute,
 ) -> list[ElementTerm]:
-    """Constraints (1) to (8) of the auxiliary variables, and the sum of |k1| + |k2| over all stars as the target.
+    """Constraints (1) to (8) of the auxiliary variables, and the sum of ``|k1| + |k2|`` over all stars as the target.
 
     Args:
         topology: Triangle mesh.

@@ -77,7 +77,7 @@ def lifted_flat_edge_terms(topology: Topology, edges: Tensor, *, weight: float) 
     Args:
         topology: Any polygon mesh.
         edges: (n,) numbers of interior edges.
-        weight: Dimensionless.
+        weight: Of half the squares; dimensionless.
     """
     if not edges.numel():
         return []

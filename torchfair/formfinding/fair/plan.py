@@ -40,16 +40,16 @@ class FairPlan(Plan):
         self._problem = problem
 
     def stages(self) -> Stages:
-        """All portions, and planarity once more where the last one was not enough."""
+        """All portions, and planarity once more where the last one was not enough, unless every step is taken."""
         problem, start = self._problem, self.state["vertices"]
-        portions = self.planned()
+        portions, most = self.planned(), 1.0 if problem.settings.projection.takes_every_step else _LARGEST_SHARE
         while portions:
             share, blur = portions.pop(0)
             problem.pulls.aim(share, start)
             settings = problem.settings.stage() if portions else problem.settings.projection
             yield problem.stage(self.state, share, blur, settings)
             self.state = problem.blocks(self.state["vertices"])
-            if not portions and share < _LARGEST_SHARE and not problem.is_planar(problem.placed(self.state)):
+            if not portions and share < most and not problem.is_planar(problem.placed(self.state)):
                 portions.append(Portion(share + _SHARE_STEP, 1.0))
 
     def planned(self) -> list[Portion]:

@@ -111,9 +111,10 @@ class FairSettings:
         """Guided projection as printed (paper section 5.1), with the paper's weights of Fig. 18 by their names.
 
         The paper's variables; ``w_reg |X - X_prev|^2`` with constant ``w_reg``; every step taken; plain second
-        differences; tangent planes of the reference and of the boundary; no barriers, limits, guards or stages. What
-        is promised is measured all the same. Constraints have weight 1. E enters as ``2 delta^2 mu^2``, which is
-        ``l l*`` where constraints hold; the paper's quadratic form ``l l*`` is indefinite.
+        differences; tangent planes of the reference and of the boundary; ``l* = 0`` for the diagonals of panels, with
+        equal normals; no barriers, limits, guards or stages. What is promised is measured all the same. Constraints
+        have weight 1. E enters as ``2 delta^2 mu^2``, which is ``l l*`` where constraints hold; the paper's quadratic
+        form ``l l*`` is indefinite.
 
         Args:
             w_reg: Of the squared change of the unknowns in a step.
@@ -133,7 +134,7 @@ class FairSettings:
             handle_weight=w_handle,
             boundary_weight=w_prox,
             planarity_weight=0.0,
-            flat="none",
+            flat_weight=1.0,
             quality_weight=0.0,
             continuation=(),
             formulation="lifted",
