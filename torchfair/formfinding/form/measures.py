@@ -44,8 +44,8 @@ def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Te
         ``total_mean_curvature`` (length), ``energy_over_curvature``, ``area``, ``mean_edge_length``,
         ``smallest_angle_degrees``, ``largest_dihedral_angle_degrees``, ``folded_faces`` that look away from what
         surrounds them, ``self_intersections`` (pairs of faces that meet without being neighbours),
-        ``largest_tilt_degrees`` between prescribed normals and those at the boundary (:class:`BoundaryNormals`), ``largest_boundary_distance``
-        and ``largest_handle_distance``.
+        ``largest_tilt_degrees`` between prescribed normals and those at the boundary (:class:`BoundaryNormals`),
+        ``largest_boundary_distance`` and ``largest_handle_distance``.
     """
     energy, curvature = (float(of(vertices, topology)) for of in (normal_variation, total_absolute_curvature))
     return {
