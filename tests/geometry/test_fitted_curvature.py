@@ -178,8 +178,6 @@ def test_rings_are_as_many_as_the_noise_needs() -> None:
     assert found[-1] >= 5
     moved = 1e-3 * noisy(mesh, 0.02, "normal") @ random_rotation(1).T + 5
     assert rings_for_noise(moved, mesh.topology) == found[2]
-    # By its own account a wider fit is no better here: what is left is the edges of the box, not noise.
-    assert rings_for_noise(*GENERIC["quads"]()) <= 3
 
 
 def test_doubts_are_the_errors_that_noise_makes() -> None:
