@@ -132,3 +132,17 @@ def test_single_precision() -> None:
         single = offset_directions(vertices.float(), topology)
         assert single.dtype == torch.float32
         torch.testing.assert_close(single.double(), offset_directions(vertices, topology), atol=2e-3, rtol=2e-3)
+
+
+def test_faces_without_area_do_not_count() -> None:
+    """A sliver of no area between two faces of a star: the same offset, the same deviation as without it."""
+    angles = torch.tensor([0.0, 1.0, 2.2, 3.5, 4.9], dtype=DOUBLE)
+    rim = torch.stack([angles.cos(), angles.sin(), torch.tensor([0.2, -0.3, 0.1, 0.4, -0.2], dtype=DOUBLE)], dim=1)
+    plain = torch.cat([torch.zeros(1, 3, dtype=DOUBLE), rim])
+    faces = [[0, 1 + i, 1 + (i + 1) % 5] for i in range(5)]
+    more = torch.cat([plain, 2.0 * rim[4:]])  # beyond the fifth vertex of the rim, on the same ray
+    split = [*faces[:4], [0, 5, 6], [0, 6, 1]]
+    for function in (offset_directions, conical_deviations):
+        expected = function(torch.cat([plain[:5], more[6:]]), Topology.from_faces(faces))[0]
+        torch.testing.assert_close(function(more, Topology.from_faces(split))[0], expected)
+    assert conical_deviations(plain, Topology.from_faces(faces))[0] > 0.01

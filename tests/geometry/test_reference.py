@@ -66,3 +66,13 @@ def test_normals_of_planes_point_to_one_side_however_the_reference_turns_them() 
 def test_functions_that_are_none_are_refused(reference: object, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
         closest_on(reference)(torch.ones(2, 3, dtype=DOUBLE))  # type: ignore[arg-type]
+
+
+def test_what_functions_depend_on_carries_no_graph() -> None:
+    radius = torch.tensor(2.0, dtype=DOUBLE, requires_grad=True)
+    positions, normals = closest_on(lambda points: (radius * unit_sphere(points)[0], unit_sphere(points)[1]))(
+        torch.ones(2, 3, dtype=DOUBLE, requires_grad=True)
+    )
+    assert not positions.requires_grad
+    assert not normals.requires_grad
+    torch.testing.assert_close(torch.linalg.vector_norm(positions, dim=1), torch.full((2,), 2.0, dtype=DOUBLE))

@@ -72,6 +72,9 @@ def test_where_nothing_can_be_judged_numbers_are_missing() -> None:
     assert missing["largest_tangential_gradient"] is None
     assert missing["tangential_imbalance"] is None
     assert missing["largest_reference_distance"] == 0
+    away = torch.cat([vertices, torch.full((1, 3), 100.0, dtype=DOUBLE)])  # an isolated vertex is nowhere
+    more = Topology.from_faces(topology.face_lists(), len(away))
+    assert float(measure_stationarity(away, more, surface).distances.max()) == 0
     with pytest.raises(ShapeError, match="not a batch"):
         measure_stationarity(vertices[None], topology, surface)
 

@@ -44,6 +44,10 @@ def test_planes_of_faces_are_polar_to_vertices() -> None:
     mesh = irregular_triangles(Paraboloid(), 150)
     dual = polar_dual(mesh.vertices, mesh.topology, BELOW)
     assert dual.one_sided.all()
+    assert polar_dual(mesh.vertices, mesh.topology, -BELOW).one_sided.all()
+    between = polar_dual(mesh.vertices, mesh.topology, torch.tensor([0.31, 0.17, 0.02], dtype=DOUBLE)).one_sided
+    assert between.any()
+    assert not between.all()
     inner = ~mesh.topology.is_boundary_vertex
     assert sorted(dual.mesh_vertices.tolist()) == torch.nonzero(inner).squeeze(1).tolist()
     for face, vertex in zip(dual.topology.face_lists(), dual.mesh_vertices.tolist(), strict=True):

@@ -88,7 +88,7 @@ def _directions_and_misfits(given: Tensor, topology: Topology) -> tuple[Tensor, 
     start = (counts / torch.where(known, squared, 1.0))[..., None] * total
     start = torch.where(known[..., None], start, 0.0)
 
-    missing = valid * (1.0 - dot(normals, gather(start, topology.corners)))
+    missing = 1.0 - dot(normals, gather(start, topology.corners))
     squares = (normals[..., :, None] * normals[..., None, :]).flatten(-2)
     sums = scatter_sum(torch.cat([squares, missing[..., None] * normals], -1), topology.corners, topology.num_vertices)
     solved = (known & (counts > 2))[..., None]

@@ -40,7 +40,8 @@ class Quantity:
         value: None where it is not defined (no edges, no area).
         unit: ``"length"``, that of the vertices; ``"area"``, its square; ``"1 / length"``; ``"degrees"``;
             ``"dimensionless"``.
-        group: ``"mesh"``, ``"energies"``, ``"energies per area"`` or ``"shape"``.
+        group: ``"mesh"``, ``"energies"``, ``"energies per area"``, ``"shape"``, or ``"on the reference surface"`` for
+            those of :class:`torchfair.measuring.Stationarity`.
     """
 
     key: str
