@@ -74,6 +74,15 @@ def test_vertices_slide_on_the_exact_torus_and_lower_the_energy() -> None:
     assert (torch.hypot(torch.hypot(x, y) - 2.0, z) - 0.8).abs().max() > 2.0 * exact
 
 
+def test_finer_levels_stay_on_the_exact_sphere() -> None:
+    mesh = icosphere(0)
+    settings = FairSettings(closeness_weight=1e4, distance_limit=None, projection=QUICK)
+    sphere = ClosestOnSurface(Sphere(1.0))
+    result = minimise_normal_variation(mesh.vertices, mesh.topology, reference=sphere, settings=settings, levels=1)
+    assert len(result.vertices) == 42
+    assert (vector_norm(result.vertices, dim=1) - 1.0).abs().max() < 0.002
+
+
 def test_height_functions_hold_a_patch() -> None:
     surface = Paraboloid(1.0, -0.5, (1.0, 1.0))
     mesh = irregular_triangles(surface, 80)
