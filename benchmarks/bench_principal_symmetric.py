@@ -38,7 +38,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from symmetric_problems import CASES, SHAPES, Handles, prepared
+from symmetric_problems import CASES, SHAPES, Handles, prepared, variables_as_printed
 from torch import Tensor
 
 import torchfair
@@ -206,8 +206,8 @@ def edits(
 
 def table_20(figures: list[str], formulations: list[str], steps: int) -> list[dict[str, object]]:
     """Variables and seconds of a damped step from the first pull of the handles, beside the paper's."""
-    print(f"\n{'ours':>44}{'paper':>30}\n{'fig.':>5}{'V':>6}{'E':>7}{'F':>7}{'stars':>7}  {'formulation':12}", end="")
-    print(f"{'variables':>10}{'s/step':>8}{'variables':>11}{'s/step':>8}{'over ours':>11}")
+    print(f"\n{'ours':>44}{'paper':>41}\n{'fig.':>5}{'V':>6}{'E':>7}{'F':>7}{'stars':>7}  {'formulation':12}", end="")
+    print(f"{'variables':>10}{'as printed':>11}{'s/step':>8}{'variables':>11}{'s/step':>8}{'over ours':>11}")
     rows = []
     for figure in figures:
         case = CASES[figure]
@@ -215,20 +215,26 @@ def table_20(figures: list[str], formulations: list[str], steps: int) -> list[di
             if formulation == "lifted" and case.size > LIFTED_MOST:
                 continue
             shape = SHAPES[case.size]
-            design, handles = prepared(shape, formulation, most_steps=steps, on_polylines=case.on_polylines)
+            weight = case.energy_weight if formulation == "lifted" else 0.0  # as the paper counts
+            design, handles = prepared(
+                shape, formulation, most_steps=steps, on_polylines=case.on_polylines, energy_weight=weight
+            )
             design.move(handles)
             taken = sum(run.iterations for run in design.runs)
             seconds = sum(run.timings["total"] for run in design.runs) / taken
-            variables = sum(block.numel() for block in design.session.state.values())
+            variables = max(sum(block.numel() for block in run.blocks.values()) for run in design.runs)
             mesh, stars = design.topology, design.stars.vertices.shape[0]
+            printed = variables_as_printed(
+                mesh.num_vertices, mesh.num_edges, mesh.num_faces, with_energy=case.energy_weight > 0.0
+            )
             rows.append({
                 "figure": figure, "vertices": mesh.num_vertices, "edges": mesh.num_edges, "faces": mesh.num_faces,
                 "stars": stars, "formulation": formulation, "variables": variables, "step_s": seconds,
-                "paper_variables": 1000 * case.variables, "paper_step_s": case.seconds,
+                "counted_as_printed": printed, "paper_variables": 1000 * case.variables, "paper_step_s": case.seconds,
             })  # fmt: skip
             print(
                 f"{figure:>5}{mesh.num_vertices:>6}{mesh.num_edges:>7}{mesh.num_faces:>7}{stars:>7}  "
-                f"{formulation:12}{variables:>10}{seconds:8.3f}{case.variables:>10}k{case.seconds:8.2f}"
+                f"{formulation:12}{variables:>10}{printed:>11}{seconds:8.3f}{case.variables:>10}k{case.seconds:8.2f}"
                 f"{case.seconds / seconds:11.1f}",
                 flush=True,
             )

@@ -10,6 +10,7 @@ from helpers import DOUBLE, random_rotation, tetrahedron
 
 from torchfair import MeshError, ShapeError, Topology
 from torchfair.constraints.principal_symmetric import star_stencil, unevenness
+from torchfair.energies import normal_variation
 from torchfair.formfinding import SymmetricDesign, SymmetricSettings, principal_symmetric, strip_normals
 from torchfair.formfinding.symmetric.measures import condition_residuals
 from torchfair.geometry import vertex_normals
@@ -177,6 +178,26 @@ def test_conditions_on_one_polyline_leave_the_rest_to_energy() -> None:
     assert coarse.after["stars"] == len(torch.unique(line))
     assert coarse.after["normal_variation"] < coarse.before["normal_variation"]
     assert result.levels[1].after["stars"] == 2 * len(torch.unique(line))
+
+
+@pytest.mark.slow
+def test_energy_has_the_variables_of_the_paper_too() -> None:
+    """3V + 3R + 3n + 2R of spheres, planes and slacks, and 3F + 4I of E, in the runs that lower it; E falls by it."""
+    vertices, edges = start("torus")
+    handles = pulled(vertices, edges, 0.05)
+    energies = {}
+    for weight in (0.0, 1.0):
+        settings = SymmetricSettings(formulation="lifted", energy_weight=weight)
+        result = principal_symmetric(vertices, edges, handles=handles, settings=settings)
+        level, topology = result.levels[-1], edges.topology
+        stars, planes = len(edges.stars().vertices), int(edges.mask.sum())
+        count = 3 * topology.num_vertices + 3 * stars + 3 * planes + 2 * stars
+        with_energy = count + 3 * topology.num_faces + 4 * topology.num_interior_edges
+        sizes = [sum(block.numel() for block in run.blocks.values()) for run in level.runs]
+        assert max(sizes) == (with_energy if weight else count)
+        assert max(level.after["largest_cospherical"], level.after["largest_coplanar"]) < 1e-6
+        energies[weight] = float(normal_variation(level.vertices, topology))
+    assert energies[1.0] < energies[0.0]
 
 
 def test_handles_that_ask_for_the_impossible_yield_to_the_conditions() -> None:

@@ -12,6 +12,7 @@ from helpers import DOUBLE, cube, grid_faces, tetrahedron, wavy_grid
 from PIL import Image
 
 from torchfair import MeshFileError, ShapeError, Topology
+from torchfair.subdivision import hybrid
 from torchfair.viewing import (
     picture_before_after,
     picture_curvature,
@@ -193,3 +194,18 @@ assert "matplotlib" in sys.modules
 assert "matplotlib.pyplot" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_before_and_after_may_have_different_topologies(tmp_path: Path) -> None:
+    """As a mesh and its refinement have."""
+    vertices, topology = cube()
+    step = hybrid(topology)
+    both = (topology, step.topology)
+    for number, picture in enumerate((picture_before_after, picture_gauss_images)):
+        path = tmp_path / f"{number}.png"
+        assert min(picture(path, vertices, step.apply(vertices), both, width=400)) > 100
+        with pytest.raises(ShapeError, match="topology"):
+            picture(tmp_path / "none.png", vertices, vertices, [topology], width=400)
+    picture_before_after(tmp_path / "same.png", vertices, vertices, (topology, topology), width=400)
+    picture_before_after(tmp_path / "one.png", vertices, vertices, topology, width=400)
+    assert (tmp_path / "same.png").read_bytes() == (tmp_path / "one.png").read_bytes()

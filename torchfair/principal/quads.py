@@ -38,7 +38,7 @@ def triangles_from_quads(vertices: Tensor, topology: Topology, seed_edge: int | 
             if there are any, choose for themselves.
 
     Returns:
-        The principal edges, whose topology is that of the triangles: two for each quad, in their order.
+        The principal edges. Their topology is that of the triangles, two for each quad in the order of the quads.
 
     Raises:
         MeshError: if a face is not a quad; there is no such edge; edges cannot be told apart in two families, which
