@@ -26,6 +26,7 @@ from torchfair.formfinding import (
     minimise_normal_variation,
     principal_symmetric,
 )
+from torchfair.formfinding.symmetric.problem import Aim
 from torchfair.io import plain
 from torchfair.polylines import straight_triples
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
@@ -170,6 +171,16 @@ def test_symmetric_lowers_half_the_papers_functional() -> None:
         "normals": 3 * 360,
         "lengths": 4 * 540,
     }
+
+
+def test_variables_of_e_fit_the_vertices_after_every_stage_also_where_none_of_its_terms_asks_them_to() -> None:
+    vertices, principal = torus()
+    settings = SymmetricSettings(formulation="lifted", energy_weight=0.1)
+    problem = SymmetricRecipe(vertices, principal, settings=settings).problem
+    stage = problem.stage(problem.blocks(problem.base), Aim.EXACT, settings.projection)
+    assert {name for term in stage.terms() for name, _ in term.stencil}.isdisjoint({"normals", "lengths"})
+    after = stage.result({**stage.blocks, "vertices": problem.base + 0.01 * problem.base.sin()})
+    assert constraints_of_the_energy(after, principal.topology) < 1e-20
 
 
 def test_without_a_target_the_variables_of_e_are_left_out() -> None:
