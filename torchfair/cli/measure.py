@@ -73,10 +73,11 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, measures, prints."""
-    from ..measuring import measure_mesh, worst_edges
+    from ..measuring import curvature_doubts, fold_measures, measure_mesh, worst_edges
 
     mesh = read_input(arguments.input, arguments.repair)
     quantities = measure_mesh(mesh.vertices, mesh.topology)
+    doubts = curvature_doubts(fold_measures(mesh.vertices.double(), mesh.topology))
     worst = worst_edges(mesh.vertices, mesh.topology, arguments.worst)
     if arguments.json:
         entries = {
@@ -84,12 +85,15 @@ def run(arguments: argparse.Namespace) -> int:
             "repairs": list(mesh.repairs),
             "units": {quantity.key: _unit(quantity) for quantity in quantities},
             "worst_edges": worst,
+            "curvature_doubts": doubts,
         }
         sys.stdout.write(to_json({**{quantity.key: quantity.value for quantity in quantities}, **entries}))
     else:
         for sentence in mesh.repairs:
             print(f"repaired: {sentence}")
         print(f"{arguments.input}\n{format_quantities(quantities)}")
+        for doubt in doubts:
+            print(f"\nC is not to be trusted: {doubt}")
         if worst:
             print(format_edges(worst))
     return 0

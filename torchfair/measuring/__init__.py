@@ -7,3 +7,5 @@ from .measurements import Quantity as Quantity
 from .measurements import count_components as count_components
 from .measurements import measure_mesh as measure_mesh
 from .measurements import worst_edges as worst_edges
+from .trust import curvature_doubts as curvature_doubts
+from .trust import fold_measures as fold_measures
