@@ -18,6 +18,7 @@ from .geometry.spline_curves import SplineCurves
 Floats = npt.NDArray[np.float64]
 
 _SAMPLES = 24  # of arc length, between two points of the curve
+_SAME = 1e-9  # of the extent: neighbours that are nearer coincide
 _DENSE = 2048  # samples of a curve that is given as a function
 
 
@@ -155,7 +156,8 @@ def _checked(points: Tensor) -> Floats:
     bad = np.flatnonzero(~np.isfinite(places).all(1))
     if bad.size:
         raise MeshError(f"points {bad[:5].tolist()} of a closed curve are not finite")
-    same = np.flatnonzero((places == np.roll(places, -1, axis=0)).all(1))
+    steps = np.linalg.norm(places - np.roll(places, -1, axis=0), axis=1)
+    same = np.flatnonzero(steps <= _SAME * np.ptp(places, axis=0).max())
     if same.size:
         raise MeshError(f"points {same[:5].tolist()} of a closed curve coincide with the next ones: leave them out")
     return places

@@ -130,3 +130,49 @@ def test_existing_files_are_kept(circle: str, tmp_path: Path, capsys: pytest.Cap
     assert output.read_text() == "precious"
     assert main(["form", "--curve", circle, "-o", str(output), "--force", *FEW, *QUIET]) == 0
     assert load_mesh(output).topology.num_faces > 0
+
+
+def notes_of(folder: Path) -> list[str]:
+    return list(json.loads((folder / "report.json").read_text())["notes"])
+
+
+def test_curves_alone_are_tried_from_several_starts(circle: str, tmp_path: Path) -> None:
+    words = ["form", "--curve", circle, *FEW, "--no-pictures"]
+    assert main([*words, "-o", str(tmp_path / "six" / "x.obj")]) == 0
+    assert any(note.startswith("C from 6 starts") for note in notes_of(tmp_path / "six"))
+    assert main([*words, "-o", str(tmp_path / "one" / "x.obj"), "--starts", "1"]) == 0
+    assert not any("starts" in note for note in notes_of(tmp_path / "one"))
+    assert main(["form", str(tmp_path / "one" / "x.obj"), "-o", str(tmp_path / "mesh" / "x.obj"), *QUIET]) in (0, 1)
+    assert not any("starts" in note for note in notes_of(tmp_path / "mesh"))
+
+
+def test_points_on_the_rim_and_far_away_are_said(
+    circle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["form", "--curve", circle, *FEW, *QUIET, "--starts", "1"]
+    assert main([*words, "-o", str(tmp_path / "rim.obj"), "--through", "1", "0", "0"]) == 0
+    assert "--through 1 0 0 lies on the boundary" in capsys.readouterr().out
+    assert (
+        main([*words, "-o", str(tmp_path / "far.obj"), "--through", "0", "0", "95", "--results", f"{tmp_path}/f"]) == 1
+    )
+    assert "lies 95 from the start, which is 2 across" in capsys.readouterr().out
+
+
+def test_an_arc_is_closed_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [(math.cos(math.pi * i / 24), math.sin(math.pi * i / 24)) for i in range(25)]
+    (tmp_path / "arc.xyz").write_text("".join(f"{x} {y} 0\n" for x, y in rows))
+    words = ["form", "--curve", str(tmp_path / "arc.xyz"), "-o", str(tmp_path / "x.obj"), *FEW, *QUIET]
+    assert main(words) == 2
+    assert "--close" in error_line(capsys)
+    assert main([*words, "--close"]) == 0
+    assert "closed by a straight line" in capsys.readouterr().out
+
+
+def test_a_rim_that_is_not_convex_stays_flat(tmp_path: Path) -> None:
+    (tmp_path / "ell.xyz").write_text("0 0 0\n8 0 0\n8 3 0\n3 3 0\n3 8 0\n0 8 0\n")
+    words = ["form", "--curve", str(tmp_path / "ell.xyz"), "-o", str(tmp_path / "x.obj"), "--no-pictures"]
+    assert main([*words, "--vertices", "100", "--starts", "2"]) == 0
+    after = json.loads((tmp_path / "report.json").read_text())["energies"]["after"]
+    assert after["area"] == pytest.approx(39.0, rel=1e-9)
+    assert after["normal_variation"] < 1e-6
+    assert after["smallest_angle_degrees"] > 15.0

@@ -44,7 +44,8 @@ def test_json_is_one_strict_object(tmp_path: Path, capsys: pytest.CaptureFixture
         "dihedral_angle_degrees",
         "angle_variation",
     }
-    assert set(measured["units"]) == set(measured) - {"file", "repairs", "worst_edges", "units"}
+    assert set(measured["units"]) == set(measured) - {"file", "repairs", "worst_edges", "curvature_doubts", "units"}
+    assert measured["curvature_doubts"] == []
 
 
 def test_json_of_a_degenerate_mesh_has_nulls_for_what_is_undefined(
@@ -83,3 +84,17 @@ def test_repair_is_said_and_done(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert len(measured["repairs"]) >= 1
     assert main(["measure", str(path), "--repair"]) == 0
     assert capsys.readouterr().out.startswith("repaired: ")
+
+
+def test_folds_that_c_does_not_see_are_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A strip folded back onto itself: C = 0, E is not."""
+    places = [(x, y, 0) for x in (0, 1, 0.4) for y in (0, 1, 2)]
+    faces = [(a, a + 3, a + 4, a + 1) for a in (1, 2, 4, 5)]
+    lines = [*(f"v {x} {y} {z}" for x, y, z in places), *("f " + " ".join(map(str, face)) for face in faces)]
+    (tmp_path / "folded.obj").write_text("\n".join(lines) + "\n")
+    assert main(["measure", str(tmp_path / "folded.obj")]) == 0
+    out = capsys.readouterr().out
+    assert "C is not to be trusted: E = 4 is more than 3 times C" in out
+    assert "a dihedral angle of 180 degrees" in out
+    assert main(["measure", "example:roof"]) == 0
+    assert "trusted" not in capsys.readouterr().out

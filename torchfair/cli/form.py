@@ -25,6 +25,9 @@ def _curvature(path: Path, request: Request, result: JobResult[Level], overwrite
     picture_curvature(path, [start, ("result", result.vertices, result.topology)], overwrite=overwrite)
 
 
+_STARTS = 6  # surfaces that are tried where nobody said where to start
+
+
 class FormCommand(JobCommand):
     """Lowers C with a given boundary."""
 
@@ -32,8 +35,8 @@ class FormCommand(JobCommand):
     purpose = "find a surface of least absolute curvature"
     description = (
         "Finds the surface of least total absolute curvature C, the integral of |k1| + |k2|, with a given boundary: "
-        "the smoothest that a polyhedral mesh can approximate. Starts from a mesh, or from one or two boundary curves "
-        "alone."
+        "the smoothest that a polyhedral mesh can approximate. Starts from a mesh, or from boundary curves "
+        "alone, of which several surfaces are tried."
     )
     pictures: ClassVar[Mapping[str, Writer]] = {"curvature.png": _curvature, "edges.png": draw_edges}
 
@@ -55,7 +58,11 @@ class FormCommand(JobCommand):
         add("input", metavar="INPUT", nargs="?", help="mesh file to start from, or a built-in example:NAME; left out, "
             "a start is made from the curves")  # fmt: skip
         add("--curve", action="append", default=[], metavar="FILE", help="closed boundary curve: a text file with x y "
-            "z, or x y z and a normal, in every line; one for a disk, two for an annulus")  # fmt: skip
+            "z, or x y z and a normal, in every line; or the curves of an OBJ (line elements), DXF or 3DM file; one "
+            "curve for a disk, two for an annulus, more for more holes; repeatable")  # fmt: skip
+        add("--close", action="store_true", help="close open arcs by straight lines")
+        add("--starts", type=positive_count, metavar="N", help="try so many surfaces to start from, and go on with the "
+            "best (default 6 from curves alone, 1 from a mesh)")  # fmt: skip
         add("--vertices", type=positive_count, default=1000, metavar="N", help="size of a start made from curves "
             "(default 1000)")  # fmt: skip
         add("--through", nargs=3, action="append", default=[], type=float, metavar=("X", "Y", "Z"),
@@ -72,8 +79,9 @@ class FormCommand(JobCommand):
             "normals": start.normals,
             "handles": read_handles(arguments) | start.nearest(arguments.through),
             "levels": arguments.levels,
+            "starts": arguments.starts or (_STARTS if arguments.input is None else 1),
         }
-        return Request(start.mesh, options)
+        return Request(start.mesh, options, notes=start.notes)
 
 
 COMMAND = FormCommand()

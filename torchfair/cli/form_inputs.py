@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from ..io import PolygonMesh
 
 
+_ON_THE_RIM = 0.05  # mean edge lengths
+
+
 class FormInput(NamedTuple):
     """A start and its boundary.
 
@@ -23,11 +26,13 @@ class FormInput(NamedTuple):
         mesh: The start.
         curves: Boundary curves, empty if none were given.
         normals: (V, 3) prescribed normals of boundary vertices, or None.
+        notes: What was decided while reading, in words.
     """
 
     mesh: PolygonMesh
     curves: list[ClosedCurve]
     normals: Tensor | None
+    notes: list[str]
 
     def nearest(self, points: Sequence[Sequence[float]]) -> dict[int, list[float]]:
         """The nearest inner vertex of every point, with the point as target."""
@@ -39,6 +44,8 @@ class FormInput(NamedTuple):
         targets = {}
         for point in points:
             place = torch.tensor(point, dtype=torch.float64)
+            if not self._is_reached(point, place):
+                continue
             distances = (self.mesh.vertices[inner].double() - place).norm(dim=1)
             vertex = int(inner[distances.argmin()])
             if vertex in targets:
@@ -46,16 +53,45 @@ class FormInput(NamedTuple):
             targets[vertex] = list(point)
         return targets
 
+    def _is_reached(self, point: Sequence[float], place: Tensor) -> bool:
+        """Whether a vertex has to be pulled to the point; says where that asks for much, or for nothing."""
+        import torch
+
+        from ..geometry import edge_lengths
+
+        vertices, topology = self.mesh.vertices.double(), self.mesh.topology
+        words = "--through " + " ".join(f"{x:g}" for x in point)
+        rim = vertices[topology.boundary_edges]
+        if rim.numel():
+            start, way = rim[:, 0], rim[:, 1] - rim[:, 0]
+            share = ((place - start) * way).sum(1) / (way * way).sum(1).clamp_min(1e-300)
+            gap = float((start + share.clamp(0.0, 1.0)[:, None] * way - place).norm(dim=1).min())
+            edge = float(edge_lengths(vertices, topology).mean())
+            if gap < _ON_THE_RIM * edge:
+                self.notes.append(f"{words} lies on the boundary, which passes there anyway: left out")
+                return False
+            if gap < edge:
+                self.notes.append(
+                    f"{words} lies {gap / edge:.2g} mean edges from the boundary: the surface is steep there"
+                )
+        extent = float((vertices.amax(0) - vertices.amin(0)).max())
+        away = float(torch.linalg.vector_norm(vertices - place, dim=1).min())
+        if away > extent:
+            self.notes.append(
+                f"{words} lies {away:.4g} from the start, which is {extent:.4g} across: check its unit and its order"
+            )
+        return True
+
 
 def read_form_input(arguments: argparse.Namespace, corner_angle: float) -> FormInput:
     """Reads mesh and curves; makes a start from the curves if there is no mesh."""
     from ..curves import ClosedCurve
     from ..formfinding import prescribed_normals, start_surface
-    from ..io import PolygonMesh, load_curve
+    from ..io import PolygonMesh, load_curves
 
     if arguments.input is None and not arguments.curve:
         raise CommandError("give a mesh to start from, or boundary curves by --curve FILE")
-    files = [load_curve(name) for name in arguments.curve]
+    files = [file for name in arguments.curve for file in load_curves(name, close=arguments.close)]
     curves = [ClosedCurve(file.points, corner_angle=corner_angle) for file in files]
     if arguments.input is not None:
         mesh = read_input(arguments.input, arguments.repair)
@@ -63,4 +99,4 @@ def read_form_input(arguments: argparse.Namespace, corner_angle: float) -> FormI
         mesh = PolygonMesh(*start_surface(curves, arguments.vertices))
     given = [(curve, file.normals) for curve, file in zip(curves, files, strict=True) if file.normals is not None]
     normals = prescribed_normals(mesh.vertices, mesh.topology, curves, given) if given else None
-    return FormInput(mesh, curves, normals)
+    return FormInput(mesh, curves, normals, [note for file in files for note in file.notes])

@@ -84,7 +84,7 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Reads, measures, prints."""
     from ..geometry import ReferenceSurface
-    from ..measuring import measure_mesh, measure_stationarity, worst_edges
+    from ..measuring import curvature_doubts, fold_measures, measure_mesh, measure_stationarity, worst_edges
 
     if arguments.per_vertex and not (arguments.json and arguments.reference):
         raise CommandError("--per-vertex gives lists with --json and --reference only", NAME)
@@ -95,6 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
         stationarity = measure_stationarity(mesh.vertices, mesh.topology, ReferenceSurface(*reference))
         quantities += stationarity.quantities()
         lists = {"per_vertex": stationarity.per_vertex()} if arguments.per_vertex else {}
+    doubts = curvature_doubts(fold_measures(mesh.vertices.double(), mesh.topology))
     worst = worst_edges(mesh.vertices, mesh.topology, arguments.worst)
     if arguments.json:
         entries = {
@@ -103,12 +104,15 @@ def run(arguments: argparse.Namespace) -> int:
             "units": {quantity.key: _unit(quantity) for quantity in quantities},
             "worst_edges": worst,
             **lists,
+            "curvature_doubts": doubts,
         }
         sys.stdout.write(to_json({**{quantity.key: quantity.value for quantity in quantities}, **entries}))
     else:
         for sentence in mesh.repairs:
             print(f"repaired: {sentence}")
         print(f"{arguments.input}\n{format_quantities(quantities)}")
+        for doubt in doubts:
+            print(f"\nC is not to be trusted: {doubt}")
         if worst:
             print(format_edges(worst))
     return 0

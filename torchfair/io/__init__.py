@@ -10,6 +10,7 @@ from .atomic import atomic_write_bytes as atomic_write_bytes
 from .atomic import atomic_write_text as atomic_write_text
 from .curve_points import CurvePoints as CurvePoints
 from .curve_points import load_curve as load_curve
+from .curve_points import load_curves as load_curves
 from .edge_labels import edge_labels_path as edge_labels_path
 from .edge_labels import load_edge_labels as load_edge_labels
 from .edge_labels import save_edge_labels as save_edge_labels

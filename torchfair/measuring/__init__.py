@@ -9,3 +9,5 @@ from .measurements import measure_mesh as measure_mesh
 from .measurements import worst_edges as worst_edges
 from .stationarity import Stationarity as Stationarity
 from .stationarity import measure_stationarity as measure_stationarity
+from .trust import curvature_doubts as curvature_doubts
+from .trust import fold_measures as fold_measures

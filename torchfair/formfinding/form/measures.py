@@ -11,22 +11,18 @@ from torch import Tensor
 from ...constraints import BoundaryNormals
 from ...energies import (
     angle_variation,
-    normal_variation,
-    total_absolute_curvature,
     total_frobenius_curvature,
     total_mean_curvature,
 )
-from ...geometry import corner_angles, dihedral_angles, edge_lengths, face_areas, face_normals, vertex_normals
-from ...self_intersections import self_intersections
+from ...geometry import corner_angles, edge_lengths, face_normals, vertex_normals
+from ...measuring import fold_measures
+from ...measuring.trust import LARGEST_DIHEDRAL, explained_variation
 from ...topology import Topology
 from ..job.promises import Promise, handle_promise
 from .settings import FormSettings
 
 _ON_THE_CURVES = 1e-6  # mean edge lengths
 _TANGENT = 1.0  # degrees
-_LARGEST_RATIO = 3.0  # of E to C: good meshes have 1 to 2, those whose edges cross ridges 2.5
-_FLAT = 0.02  # of the root of the area: E of meshes that are flat to rounding
-_LARGEST_DIHEDRAL = 150.0  # degrees
 
 
 def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Tensor, away: Tensor) -> dict[str, float]:
@@ -47,7 +43,8 @@ def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Te
         ``largest_tilt_degrees`` between prescribed normals and those at the boundary (:class:`BoundaryNormals`),
         ``largest_boundary_distance`` and ``largest_handle_distance``.
     """
-    energy, curvature = (float(of(vertices, topology)) for of in (normal_variation, total_absolute_curvature))
+    folds = fold_measures(vertices, topology)
+    energy, curvature = folds["normal_variation"], folds["total_absolute_curvature"]
     return {
         "total_absolute_curvature": curvature,
         "total_frobenius_curvature": float(total_frobenius_curvature(vertices, topology)),
@@ -55,12 +52,11 @@ def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Te
         "energy_over_curvature": energy / curvature if curvature > 0.0 else math.nan,
         "angle_variation": float(angle_variation(vertices, topology)),
         "total_mean_curvature": float(total_mean_curvature(vertices, topology)),
-        "area": float(face_areas(vertices, topology).sum()),
+        "area": folds["area"],
         "mean_edge_length": float(edge_lengths(vertices, topology).mean()),
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
-        "largest_dihedral_angle_degrees": _largest_dihedral_angle(vertices, topology),
         "folded_faces": folded_faces(vertices, topology),
-        "self_intersections": len(self_intersections(vertices, topology)),
+        **{name: folds[name] for name in ("largest_dihedral_angle_degrees", "self_intersections")},
         "largest_tilt_degrees": math.degrees(_largest_tilt(vertices, topology, normals)),
         "largest_boundary_distance": float(torch.linalg.vector_norm(vertices - rim, dim=1).max()),
         "largest_handle_distance": float(away.max()) if away.numel() else 0.0,
@@ -105,31 +101,19 @@ def form_promises(
     return promises
 
 
-def fold_measures(vertices: Tensor, topology: Topology) -> dict[str, float]:
-    """Measures of one mesh (V, 3) from which :func:`fold_promises` tells whether it is folded."""
-    return {
-        "total_absolute_curvature": float(total_absolute_curvature(vertices, topology)),
-        "normal_variation": float(normal_variation(vertices, topology)),
-        "area": float(face_areas(vertices, topology).sum()),
-        "largest_dihedral_angle_degrees": _largest_dihedral_angle(vertices, topology),
-        "self_intersections": len(self_intersections(vertices, topology)),
-    }
-
-
 def fold_promises(after: Mapping[str, float]) -> list[Promise]:
     """What C does not see: bending within a star cancels, and a mesh folded flat measures C = 0.
 
     Args:
-        after: Measures ``total_absolute_curvature``, ``normal_variation``, ``area``, ``self_intersections`` and
-            ``largest_dihedral_angle_degrees``.
+        after: Those of :func:`~torchfair.measuring.fold_measures`.
     """
     remedy = "the surface is folded, and its C means nothing: try more starts, other curves, or start from another mesh"
-    curvature, energy = after["total_absolute_curvature"], after["normal_variation"]
-    most = _LARGEST_RATIO * curvature + _FLAT * math.sqrt(after["area"])
+    energy = after["normal_variation"]
+    most = explained_variation(after["total_absolute_curvature"], after["area"])
     return [
         Promise("E, which sees folds that C does not,", most, energy, remedy=remedy),
         Promise(
-            "largest dihedral angle", _LARGEST_DIHEDRAL, after["largest_dihedral_angle_degrees"], unit="degrees",
+            "largest dihedral angle", LARGEST_DIHEDRAL, after["largest_dihedral_angle_degrees"], unit="degrees",
             remedy=remedy,
         ),
         Promise("pairs of faces that run through each other", 0.0, after["self_intersections"], remedy=remedy),
@@ -142,12 +126,6 @@ def folded_faces(vertices: Tensor, topology: Topology) -> int:
     along = (around * face_normals(vertices, topology)[topology.corner_faces]).sum(1)
     total = along.new_zeros(topology.num_faces).index_add_(0, topology.corner_faces, along)
     return int((total <= 0.0).sum())
-
-
-def _largest_dihedral_angle(vertices: Tensor, topology: Topology) -> float:
-    """Degrees, without sign."""
-    angles = dihedral_angles(vertices, topology).abs()
-    return math.degrees(float(angles.max())) if angles.numel() else 0.0
 
 
 def _largest_tilt(vertices: Tensor, topology: Topology, normals: Tensor) -> float:

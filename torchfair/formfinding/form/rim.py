@@ -16,7 +16,7 @@ from .boundary_track import BoundaryTrack, new_boundary_vertices
 from .starting.rims import refuse_crossing_rims
 
 _SAMPLES = 200  # of a curve
-_NEAR = 0.25  # of the extent of a boundary loop
+_NEAR = 0.15  # of the extent of a boundary loop
 
 
 class Rim(NamedTuple):
@@ -65,7 +65,7 @@ def check_rim(vertices: Tensor, topology: Topology, curves: Sequence[ClosedCurve
 
     Raises:
         MeshError: the mesh is closed; curves cross, touch or repeat themselves or each other; or a curve is farther
-            from its boundary loop than a quarter of the extent of the loop.
+            from its boundary loop than 0.15 times the extent of the loop.
     """
     if not len(topology.boundary_loops()):
         raise MeshError(

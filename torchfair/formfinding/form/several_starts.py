@@ -9,10 +9,12 @@ from dataclasses import replace
 from torch import Tensor
 
 from ...energies import normal_variation, total_absolute_curvature
+from ...measuring import fold_measures
 from ...projection.layout import State
 from ..job.plan import Plan, Stages
+from ..job.promises import HANDLE_REACHED
 from .follower import FormFollower
-from .measures import fold_measures, fold_promises, folded_faces
+from .measures import fold_promises, folded_faces
 from .other_starts import Start
 from .plan import FormPlan
 from .problem import FormProblem
@@ -22,7 +24,7 @@ FAR = 1.0  # mean edge lengths: a handle that is farther away is dragged, too
 _LONGEST_DRAG = 0.5  # mean edge lengths in one move
 _MOST_DRAGS = 40
 _STEPS = 3  # after each move
-_SLIVERS, _FOLDED = 1, 2  # grades of surfaces: better none
+_SLIVERS, _FOLDED = 1, 2  # grades of surfaces, or that handles are missed: better none
 
 
 class DraggedPlan(FormPlan):
@@ -97,8 +99,9 @@ class SeveralStarts(Plan):
     def _compare(self, name: str, state: State) -> None:
         problem, vertices = self._problem, state["vertices"]
         grade, fault = self._grade(vertices)
-        folded_energy = float(normal_variation(vertices, problem.topology))  # C means nothing there
-        worth = folded_energy if grade == _FOLDED else problem.curvature_and_pulls(vertices)
+        worth = problem.curvature_and_pulls(vertices)
+        if grade == _FOLDED:  # C means nothing there
+            worth += float(normal_variation(vertices, problem.topology))
         curvature = problem.length * float(total_absolute_curvature(vertices, problem.topology))
         self.found.append((name + fault, curvature))
         kept = self._kept
@@ -107,6 +110,8 @@ class SeveralStarts(Plan):
 
     def _grade(self, vertices: Tensor) -> tuple[int, str]:
         problem = self._problem
+        if bool((problem.pulls.away(vertices) > HANDLE_REACHED).any()):
+            return _FOLDED, " (misses handles)"
         if not all(promise.holds for promise in fold_promises(fold_measures(vertices, problem.topology))):
             return _FOLDED, " (folded)"
         if folded_faces(vertices, problem.topology):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-_HANDLE_REACHED = 0.05  # mean edge lengths
+HANDLE_REACHED = 0.05  # mean edge lengths
 
 
 @dataclass(frozen=True)
@@ -66,4 +66,4 @@ def handle_promise(away: float, edge: float, *, remedy: str, unit: str = "") -> 
         remedy: What to change where they are not.
         unit: Of both, empty for that of the input.
     """
-    return Promise("distance of a handle from its target", _HANDLE_REACHED * edge, away, unit=unit, remedy=remedy)
+    return Promise("distance of a handle from its target", HANDLE_REACHED * edge, away, unit=unit, remedy=remedy)

@@ -1,0 +1,87 @@
+"""Curves in drawings: line elements of OBJ files, DXF and 3DM files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import MeshFileError, TorchfairError
+from .obj import obj_words, statement_rows, vertex_numbers
+from .raw_mesh import Floats
+from .reading import read_bytes
+from .text import ranges, to_floats
+
+_FINE = 1e-4  # of the extent of a drawing: chords of arcs and splines are as near to them
+_SAMPLES = 200  # of a curve in a 3DM file that is no polyline
+
+
+def obj_pieces(path: Path) -> list[Floats]:
+    """Line elements ``l`` of an OBJ file, as points (n, 3)."""
+    data = read_bytes(path)
+    text = obj_words(path, data)
+    vertex_rows, line_rows = statement_rows(path, text, b"v", b"l")
+    if not line_rows.size:
+        raise MeshFileError(path, "has no line elements (l) that could be a boundary curve")
+    first = text.starts[vertex_rows] + 1
+    points = to_floats(path, text, ranges(first, np.full_like(first, 3))).reshape(-1, 3)
+    numbers, sizes = vertex_numbers(path, text, vertex_rows, line_rows, slashes=b"/" in data, what="a point of a line")
+    if numbers.size and not (numbers.min() >= 0 and numbers.max() < len(points)):
+        raise MeshFileError(path, f"a line element names a vertex that does not exist: there are {len(points)}")
+    return [points[piece] for piece in np.split(numbers, np.cumsum(sizes)[:-1])]
+
+
+def dxf_pieces(path: Path) -> list[Floats]:
+    """Lines, polylines, arcs, circles, ellipses and splines in the model space of a DXF file, as points (n, 3)."""
+    try:
+        import ezdxf
+        from ezdxf.path import make_path
+    except ImportError:
+        raise TorchfairError("DXF files need ezdxf: pip install 'torchfair[dxf]'. Or save the curve as text") from None
+    read_bytes(path)
+    try:
+        document = ezdxf.filemanagement.readfile(path)
+    except (ezdxf.lldxf.const.DXFError, OSError, UnicodeDecodeError) as error:
+        raise MeshFileError(path, f"is no DXF file that can be read: {error}") from None
+    found = []
+    for entity in document.modelspace():
+        try:
+            found.append((entity, make_path(entity)))
+        except TypeError:  # texts, faces and the like
+            continue
+    found = [(entity, piece) for entity, piece in found if len(piece)]
+    if not found:
+        raise MeshFileError(path, "has no lines, polylines, arcs or splines in its model space")
+    corners = np.array([tuple(vertex) for _, piece in found for vertex in piece.control_vertices()])
+    fine = _FINE * float(np.ptp(corners, axis=0).max())
+    # Arcs and splines themselves; paths are made of Bezier curves, which polylines with bulges come near to.
+    places = [getattr(entity, "flattening", piece.flattening)(fine) for entity, piece in found]
+    return [np.array([tuple(place) for place in piece]) for piece in places]
+
+
+def rhino_pieces(path: Path) -> list[Floats]:
+    """Curves of a 3DM file, as points (n, 3): the corners of polylines, others sampled."""
+    try:
+        import rhino3dm
+    except ImportError:
+        raise TorchfairError("3DM files need rhino3dm: pip install 'torchfair[rhino]'. Or save as DXF or OBJ") from None
+    read_bytes(path)
+    model = rhino3dm.File3dm.Read(str(path))
+    if model is None:
+        raise MeshFileError(path, "is no 3DM file that can be read")
+    pieces = []
+    for item in model.Objects:
+        curve = item.Geometry
+        if not isinstance(curve, rhino3dm.Curve):
+            continue
+        if isinstance(curve, rhino3dm.PolylineCurve):
+            places = [curve.Point(i) for i in range(curve.PointCount)]
+        elif curve.IsLinear(1e-9):
+            places = [curve.PointAtStart, curve.PointAtEnd]
+        else:
+            start, end = curve.Domain.T0, curve.Domain.T1
+            places = [curve.PointAt(t) for t in np.linspace(start, end, _SAMPLES + 1).tolist()]
+        pieces.append(np.array([(place.X, place.Y, place.Z) for place in places]))
+    if not pieces:
+        raise MeshFileError(path, "has no curves")
+    return pieces
