@@ -34,10 +34,12 @@ class DraggedPlan(FormPlan):
     """
 
     def stages(self) -> Stages:
-        """Moves of all handles, each with a few steps, and the last smoothing."""
+        """The job with handles where they are, moves of all of them with a few steps each, and the last smoothing."""
         problem, pulls = self._problem, self._problem.pulls
         follower = FormFollower(problem)
         start = self._start
+        pulls.aim(0.0, start)
+        yield from self._from_afar()
         moves = min(_MOST_DRAGS, max(1, math.ceil(float(pulls.away(start).max()) / _LONGEST_DRAG)))
         for move in range(1, moves + 1):
             pulls.aim(move / moves, start)
