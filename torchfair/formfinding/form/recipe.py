@@ -180,9 +180,9 @@ def minimise_absolute_curvature(
     Promises, which are measured on the result (:attr:`~torchfair.formfinding.JobResult.promises`): the boundary is on
     its curves; handles are within 0.05 mean edges of their targets; prescribed tangent planes are met within a degree;
     no more faces are folded than at the start; E is at most three times C, no dihedral angle above 150 degrees, and no
-    two faces run through each other, since C does not see folds; no corner angle falls below ``settings.least_angle`` or
-    half the smallest of the start; and C is not above that of the start, unless handles, normals or curves that the boundary is
-    moved onto ask for a different shape.
+    two faces run through each other, since C does not see folds; no corner angle falls below ``settings.least_angle``
+    or half the smallest of the start; and C is not above that of the start, unless handles, normals or curves that the
+    boundary is moved onto ask for a different shape.
 
     Args:
         vertices: (V, 3) start.
