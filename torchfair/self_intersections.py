@@ -27,8 +27,8 @@ def self_intersections(vertices: Tensor, topology: Topology) -> Tensor:
 
     Faces without a common vertex meet if they have a point in common, touching included; faces with one common vertex,
     if they meet anywhere else. Faces with a common edge are not looked at: what they can do, fold back onto each other,
-    is a dihedral angle of 180 degrees. Polygons are seen as triangles, cut as in
-    :func:`torchfair.triangulation.triangulate`.
+    is a dihedral angle of 180 degrees. Polygons are seen as triangles, cut as by
+    ``triangulation.triangulate``.
 
     Pairs of bounding boxes come from a sweep. Triangles are told apart, or not, by their projections onto all axes that
     can separate them; where that is a matter of rounding, rational arithmetic decides. So the answer is exact for the
