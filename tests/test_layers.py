@@ -17,8 +17,8 @@ FLOORS = (
     {"topology"},
     {"_graph", "_one_mesh", "boundary", "geometry", "polylines", "repair", "triangulation"},
     {"curves", "energies", "io", "normalisation", "shapes", "subdivision"},
-    {"principal", "reflection", "stars"},
-    {"constraints", "measuring", "viewing"},
+    {"fields", "principal", "reflection", "stars"},
+    {"constraints", "measuring", "meshing", "viewing"},
     {"formfinding"},
     {"cli"},
 )

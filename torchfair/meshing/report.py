@@ -1,0 +1,73 @@
+"""What is measured on a principal mesh."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..energies import NormalVariation, TotalAbsoluteCurvature
+from ..fields import Directions, FaceFrames
+from ..geometry import ReferenceSurface, edge_lengths, face_centres, planarity
+from ..topology import Topology
+from .measures import angles_to_directions
+from .verification import shape_of
+
+
+def measure(
+    vertices: Tensor,
+    topology: Topology,
+    surface: tuple[Tensor, Topology],
+    frames: FaceFrames,
+    directions: Directions,
+    spacing: float,
+    indices: Tensor,
+) -> dict[str, Any]:
+    """The report of :func:`principal_quads`: see there.
+
+    Args:
+        vertices: of the mesh that was made.
+        topology: of that mesh.
+        surface: vertices and topology of the triangles that it was made from.
+        frames: of these.
+        directions: of these.
+        spacing: that was asked for.
+        indices: of the singular points.
+    """
+    reference = ReferenceSurface(*surface)
+    angles = np.degrees(angles_to_directions(vertices, topology, reference, frames, directions, spacing))
+    sizes = topology.face_sizes
+    deviation = planarity(vertices, topology)
+    mean_edge = float(edge_lengths(vertices, topology).mean())
+    variation = float(NormalVariation(topology)(vertices))
+    curvature = float(TotalAbsoluteCurvature(surface[1])(surface[0]))
+    middles = torch.cat([face_centres(vertices, topology), vertices[topology.edges].mean(1)])
+    shape = shape_of(topology)
+    return {
+        "vertices": topology.num_vertices,
+        "faces": topology.num_faces,
+        "quads": int((sizes == 4).sum()),
+        "angle_mean_degrees": float(angles.mean()) if len(angles) else None,
+        "angle_95_degrees": float(np.percentile(angles, 95)) if len(angles) else None,
+        "planarity_mean": float(deviation.mean()),
+        "planarity_max": float(deviation.max()),
+        "normal_variation": variation,
+        "total_absolute_curvature": curvature,
+        "variation_over_curvature": variation / curvature if curvature > 1e-9 * mean_edge else None,
+        "distance_max": float(reference.closest(middles).distances.max()) / mean_edge,
+        "mean_edge": mean_edge,
+        "spacing": spacing,
+        "singular": _counts(indices),
+        "total_index": math.fsum(indices.tolist()),
+        "euler_number": shape.euler_number,
+        "boundary_loops": shape.boundary_loops,
+        "components": shape.components,
+    }
+
+
+def _counts(indices: Tensor) -> dict[str, int]:
+    values, counts = torch.unique(indices, return_counts=True)
+    return {f"{value:g}": count for value, count in zip(values.tolist(), counts.tolist(), strict=True)}
