@@ -186,7 +186,7 @@ def test_types_come_back() -> None:
 
 
 def test_where_no_mesh_is_found_that_is_said_in_one_line() -> None:
-    vertices, topology = irregular(Flat(), 900)
+    vertices, topology = irregular(Flat(), 300)
     vertices = vertices + 0.1 * torch.randn(vertices.shape, generator=torch.Generator().manual_seed(0))
     settings = MeshingSettings(fallback=False, noise=0)
     with pytest.raises(

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
 
-from .direction_field import connection_laplacian, hermitian_solve
+from .direction_field import Symmetry, connection_laplacian, hermitian_solve
 from .directions import Directions
 from .frames import Bools, FaceFrames, Floats, Ints
 from .matchings import QUARTER, vertex_charges
@@ -20,9 +20,15 @@ _MOST_NEGATIVE = -4  # four times the index of a merged vertex: eight quads meet
 
 
 def merge_singularities(
-    frames: FaceFrames, angles: Floats, matched: Ints, directions: Directions, smoothing: float, radius: float
+    frames: FaceFrames,
+    angles: Floats,
+    matched: Ints,
+    directions: Directions,
+    smoothing: float,
+    radius: float,
+    symmetry: Symmetry = 4,
 ) -> tuple[Floats, Ints]:
-    """Merges singular vertices of crosses within a radius: opposite ones cancel, negative ones become one.
+    """Merges singular vertices of a field within a radius: opposite ones cancel, negative ones become one.
 
     Two vertices of valence 5 become one of valence 6, as at a monkey saddle, four one of valence 8. The change is one
     of whole numbers along a shortest path; angles are solved for again.
@@ -34,6 +40,7 @@ def merge_singularities(
         directions: principal directions.
         smoothing: as for the field.
         radius: along edges.
+        symmetry: of the field, 2 or 4.
 
     Returns:
         Angles (F,) and matchings (I,); those given, where nothing is to be merged.
@@ -50,7 +57,7 @@ def merge_singularities(
         moved, touched = again, touched | beside
     if not touched.any():
         return angles, matched
-    return _refit(frames, angles, moved, directions, smoothing, touched), moved
+    return _refit(frames, angles, moved, directions, smoothing, touched, symmetry), moved
 
 
 def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, radius: float) -> tuple[Ints, Bools]:
@@ -92,7 +99,13 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
 
 
 def _refit(
-    frames: FaceFrames, angles: Floats, matched: Ints, directions: Directions, smoothing: float, touched: Bools
+    frames: FaceFrames,
+    angles: Floats,
+    matched: Ints,
+    directions: Directions,
+    smoothing: float,
+    touched: Bools,
+    symmetry: Symmetry,
 ) -> Floats:
     """Angles that fit new matchings, by the smoothness and the principal directions of the field."""
     near = touched[frames.triangles].any(1)
@@ -107,8 +120,8 @@ def _refit(
     f, g = frames.faces.T
     count = len(frames.triangles)
     jumps = np.bincount(g, turning, count) - np.bincount(f, turning, count)
-    principal = np.angle(directions.values) / 2
+    principal, step = np.angle(directions.values) / 2, 2 * np.pi / symmetry
     for _ in range(2):
-        nearest = principal + QUARTER * np.rint((angles - principal) / QUARTER)
+        nearest = principal + step * np.rint((angles - principal) / step)
         angles = hermitian_solve(stiffness, pull * nearest + jumps + 0j).real
     return angles

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..boundary import boundary_corners
 from ..errors import MeshError
-from ..fields import Directions, direction_field, matchings, merge_singularities, vertex_charges
+from ..fields import Directions, FaceFrames, Symmetry, direction_field, matchings, merge_singularities, vertex_charges
 from ..fields.frames import Floats, Ints
-from .boundary_cells import compact, tidy_boundary
+from ..fields.matchings import QUARTER
+from .boundary_cells import Compact, compact, tidy_boundary
 from .boundary_runs import BoundaryRun, find_runs, inward_moves
 from .crossings import off_the_lines
 from .cut_graph import CutGraph, cut_open
@@ -20,7 +21,7 @@ from .seamless_map import MapProblem, SeamlessMap
 from .seams import find_seams
 from .settings import MeshingSettings
 from .surface import DesignSurface
-from .tracing import trace_cells
+from .tracing import Cells, trace_cells
 from .untangling import untangled
 from .verification import shape_of, verified_topology
 
@@ -64,11 +65,13 @@ class PieceMesh:
     Attributes:
         positions: (N, 3).
         faces: nodes counterclockwise.
+        rows: pairs of nodes, edges with the second coordinate constant.
         singular_places, singular_charges: of the field.
     """
 
     positions: Floats
     faces: list[list[int]]
+    rows: set[tuple[int, int]]
     singular_places: Floats
     singular_charges: Ints
 
@@ -82,28 +85,62 @@ def attempt(
         FailedAttemptError: if that gives no valid mesh.
     """
     frames = surface.frames
-    angles = direction_field(frames, directions, plan.smoothing, lattice.symmetry)
-    matched = matchings(frames, angles, lattice.symmetry)
-    if lattice.symmetry == 4:
-        radius = settings.merging * plan.spacing
-        angles, matched = merge_singularities(frames, angles, matched, directions, plan.smoothing, radius)
-    charges = vertex_charges(frames, angles, matched)
-    graph = cut_open(frames, angles, matched, charges)
-    runs = find_runs(frames, graph, settings.boundary_angle, _SHORTEST_RUN * plan.spacing) if plan.align else []
+    graph = _combed(frames, directions, lattice.symmetry, plan, settings)
+    runs: list[BoundaryRun] = []
+    if plan.align:
+        shortest = _SHORTEST_RUN * plan.spacing
+        runs = find_runs(frames, graph, settings.boundary_angle, shortest, lattice.aligned)
     corners = boundary_corners(surface.vertices, surface.topology, settings.corner_angle).numpy()
     found = _map(surface, graph, lattice, plan, runs)
     inward = inward_moves(found.seams, found.values, frames.triangles, runs)
     try:
         cells = trace_cells(found, off_the_lines(found, inward), corners)
         area = lattice.cell * plan.spacing**2
-        positions, faces = compact(*tidy_boundary(cells, plan.spacing, area))
-        verified_topology(faces, len(positions), shape_of(surface.topology))
+        whole = compact(tidy_boundary(cells, plan.spacing, area))
+        verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
     except FailedAttemptError:
         raise
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None
-    singular = np.flatnonzero(charges)
-    return PieceMesh(positions, faces, frames.points[singular], charges[singular])
+    singular = np.flatnonzero(graph.charges)
+    places, charges = frames.points[singular], graph.charges[singular]
+    return PieceMesh(whole.positions, whole.faces, _rows(cells, whole), places, charges)
+
+
+def _combed(
+    frames: FaceFrames, directions: Directions, symmetry: Symmetry, plan: Plan, settings: MeshingSettings
+) -> CutGraph:
+    """The mesh cut open, with a field of directions.
+
+    Crosses are tried for directions, too: the larger and the smaller curvature change places where the surface has an
+    umbilic line, crosses go on. They will do if one of their two directions never comes back as the other.
+    """
+    radius = settings.merging * plan.spacing
+    tried: tuple[Symmetry, ...] = (4, 2) if symmetry == 2 else (4,)
+    for of in tried:
+        angles = direction_field(frames, directions, plan.smoothing, of)
+        matched = matchings(frames, angles, of)
+        angles, matched = merge_singularities(frames, angles, matched, directions, plan.smoothing, radius, of)
+        graph = cut_open(frames, angles, matched, vertex_charges(frames, angles, matched))
+        if symmetry == 4 or not (graph.quarters % 2).any():
+            break
+    if symmetry == 4:
+        return graph
+    along = directions.values * np.exp(-2j * graph.angles)
+    across = float(frames.areas @ along.real) < 0
+    return replace(graph, angles=graph.angles + QUARTER) if across else graph
+
+
+def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
+    """Pairs of nodes that are ends of an edge on a line with the second coordinate constant."""
+    pairs = [
+        (face[side], face[(side + 1) % len(face)])
+        for face, on in zip(cells.faces, cells.coordinates, strict=True)
+        for side in range(len(face))
+        if on[side] == 1
+    ]
+    numbered = np.sort(whole.number[np.array(pairs, np.int64).reshape(-1, 2)], axis=1)
+    return {(int(a), int(b)) for a, b in numbered if 0 <= a < b}
 
 
 def _map(surface: DesignSurface, graph: CutGraph, lattice: Lattice, plan: Plan, runs: list[BoundaryRun]) -> SeamlessMap:

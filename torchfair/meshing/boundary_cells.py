@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ..fields.frames import Floats
+from ..fields.frames import Floats, Ints
 from .polygon_edits import PolygonEdits
 from .tracing import Cells
 
@@ -13,7 +15,7 @@ _SMALL = 0.08  # area of faces at the boundary, over that of full cells
 _ROUNDS = 8
 
 
-def tidy_boundary(cells: Cells, spacing: float, area: float) -> tuple[Floats, list[list[int]]]:
+def tidy_boundary(cells: Cells, spacing: float, area: float) -> PolygonEdits:
     """Collapses short edges at the boundary and joins slivers with their neighbours, each change checked.
 
     Args:
@@ -22,7 +24,7 @@ def tidy_boundary(cells: Cells, spacing: float, area: float) -> tuple[Floats, li
         area: of full cells.
 
     Returns:
-        Positions and faces; positions that no face uses are among them.
+        The polygons; positions that no face uses are among theirs.
     """
     faces = [face for face in cells.faces if len(face) > 2]  # bulges of the boundary over one line
     edits = PolygonEdits(cells.positions.copy(), faces, cells.on_boundary.copy(), cells.is_corner | cells.singular)
@@ -31,7 +33,7 @@ def tidy_boundary(cells: Cells, spacing: float, area: float) -> tuple[Floats, li
             edits.drop_straight_nodes(number)
         if not _collapse_short(edits, _SHORT * spacing) + _join_small(edits, _SMALL * area):
             break
-    return edits.positions, list(edits.faces.values())
+    return edits
 
 
 def _collapse_short(edits: PolygonEdits, limit: float) -> int:
@@ -67,9 +69,26 @@ def _join_small(edits: PolygonEdits, limit: float) -> int:
     return done
 
 
-def compact(positions: Floats, faces: list[list[int]]) -> tuple[Floats, list[list[int]]]:
-    """Without the positions that no face uses."""
-    used = np.unique(np.concatenate([np.asarray(face) for face in faces])) if faces else np.zeros(0, np.int64)
-    number = np.zeros(len(positions), np.int64)
+class Compact(NamedTuple):
+    """Polygons without the positions that none of them uses.
+
+    Attributes:
+        positions: (V, 3).
+        faces: vertices counterclockwise.
+        number: (N,) vertex of every node, that of the one it was collapsed to, -1 if it is gone.
+    """
+
+    positions: Floats
+    faces: list[list[int]]
+    number: Ints
+
+
+def compact(edits: PolygonEdits) -> Compact:
+    """The polygons with new numbers."""
+    used = np.array(sorted({node for face in edits.faces.values() for node in face}), np.int64)
+    number = np.full(len(edits.positions), -1)
     number[used] = np.arange(len(used))
-    return positions[used], [number[face].tolist() for face in faces]
+    faces = [number[face].tolist() for face in edits.faces.values()]
+    for node in edits.went:
+        number[node] = number[edits.place_of(node)]
+    return Compact(edits.positions[used], faces, number)

@@ -26,7 +26,9 @@ class BoundaryRun(NamedTuple):
     corners: list[tuple[int, int]]
 
 
-def find_runs(frames: FaceFrames, graph: CutGraph, angle: float, shortest: float) -> list[BoundaryRun]:
+def find_runs(
+    frames: FaceFrames, graph: CutGraph, angle: float, shortest: float, components: tuple[int, ...] = (0, 1)
+) -> list[BoundaryRun]:
     """Longest stretches of the boundary that follow the field, cut where the mesh is cut.
 
     Args:
@@ -34,6 +36,7 @@ def find_runs(frames: FaceFrames, graph: CutGraph, angle: float, shortest: float
         graph: the cut.
         angle: largest angle between an edge and the field, radians.
         shortest: length of a stretch that counts.
+        components: coordinates whose lines run along or across the field.
     """
     topology = frames.topology
     edge_of = topology.corner_edges.numpy()
@@ -51,7 +54,7 @@ def find_runs(frames: FaceFrames, graph: CutGraph, angle: float, shortest: float
         for stretch in _stretches(off <= angle, goes_on):
             if length[stretch].sum() >= shortest:
                 runs += _cut_where_frames_turn(corners[stretch], quarter[stretch])
-    return runs
+    return [run for run in runs if run.component in components]
 
 
 def _turned_around(frames: FaceFrames, graph: CutGraph) -> Ints:

@@ -25,6 +25,11 @@ class Lattice:
     spacings: tuple[float, float]
 
     @property
+    def aligned(self) -> tuple[int, ...]:
+        """Coordinates that are constant along the field or across it."""
+        return tuple(k for k in (0, 1) if self.shear[k][1 - k] == 0)
+
+    @property
     def matrix(self) -> Floats:
         """The shear as an array."""
         return np.array(self.shear)

@@ -25,11 +25,18 @@ class PolygonEdits:
     def __init__(self, positions: Floats, faces: list[list[int]], on_boundary: Bools, fixed: Bools) -> None:
         self.positions, self.on_boundary, self.fixed = positions, on_boundary, fixed
         self.faces = {number: list(face) for number, face in enumerate(faces)}
+        self.went: dict[int, int] = {}
         self.around: dict[int, set[int]] = defaultdict(set)
         for number, face in self.faces.items():
             for node in face:
                 self.around[node].add(number)
         self.normals = {number: self.area_vector(face) for number, face in self.faces.items()}
+
+    def place_of(self, node: int) -> int:
+        """The node that a node was collapsed to, itself if it was not."""
+        while node in self.went:
+            node = self.went[node]
+        return node
 
     def area_vector(self, face: list[int]) -> Floats:
         """Of a polygon."""
@@ -163,8 +170,9 @@ class PolygonEdits:
             self.faces[number] = face
             for node in face:
                 self.around[node].add(number)
-        if gone is not None:
+        if gone is not None and stays is not None:
             del self.around[gone]
+            self.went[gone] = stays
         if stays is not None and reaches:
             self.on_boundary[stays] = True
         return True

@@ -10,9 +10,9 @@ import torch
 from torch import Tensor
 
 from ..energies import NormalVariation, TotalAbsoluteCurvature
-from ..fields import Directions, FaceFrames
 from ..geometry import ReferenceSurface, edge_lengths, face_centres, planarity
 from ..topology import Topology
+from .components import ReadSurface
 from .measures import angles_to_directions
 from .verification import shape_of
 
@@ -20,30 +20,29 @@ from .verification import shape_of
 def measure(
     vertices: Tensor,
     topology: Topology,
-    surface: tuple[Tensor, Topology],
-    frames: FaceFrames,
-    directions: Directions,
+    surface: ReadSurface,
     spacing: float,
     indices: Tensor,
+    chosen: Tensor | None = None,
 ) -> dict[str, Any]:
     """The report of :func:`principal_quads`: see there.
 
     Args:
         vertices: of the mesh that was made.
         topology: of that mesh.
-        surface: vertices and topology of the triangles that it was made from.
-        frames: of these.
-        directions: of these.
+        surface: that it was made from.
         spacing: that was asked for.
         indices: of the singular points.
+        chosen: (I,) bool: the inner edges that are to follow directions, all by default.
     """
-    reference = ReferenceSurface(*surface)
-    angles = np.degrees(angles_to_directions(vertices, topology, reference, frames, directions, spacing))
+    reference = ReferenceSurface(*surface.whole)
+    frames, directions = surface.frames, surface.directions
+    angles = np.degrees(angles_to_directions(vertices, topology, reference, frames, directions, spacing, chosen))
     sizes = topology.face_sizes
     deviation = planarity(vertices, topology)
     mean_edge = float(edge_lengths(vertices, topology).mean())
     variation = float(NormalVariation(topology)(vertices))
-    curvature = float(TotalAbsoluteCurvature(surface[1])(surface[0]))
+    curvature = float(TotalAbsoluteCurvature(surface.whole[1])(surface.whole[0]))
     middles = torch.cat([face_centres(vertices, topology), vertices[topology.edges].mean(1)])
     shape = shape_of(topology)
     return {
