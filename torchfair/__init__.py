@@ -2,7 +2,7 @@
 
 The parts are imported by name: ``torchfair.geometry``, ``torchfair.energies``, ``torchfair.shapes``,
 ``torchfair.stars``, ``torchfair.subdivision``, ``torchfair.projection``, ``torchfair.constraints``,
-``torchfair.formfinding``, ``torchfair.fields``, ``torchfair.meshing``, ``torchfair.principal``,
+``torchfair.formfinding``, ``torchfair.meshing``, ``torchfair.principal``,
 ``torchfair.cameras``, ``torchfair.reflection``, ``torchfair.viewing``, ``torchfair.measuring``,
 ``torchfair.progress``.
 """

@@ -1,4 +1,7 @@
-"""Fields of directions on triangle meshes: principal directions, crosses along them, and their singular vertices."""
+"""Fields of directions on triangle meshes: principal directions, crosses along them, and their singular vertices.
+
+Arrays of NumPy, without gradients: what :mod:`torchfair.meshing` is built on, not an interface for users.
+"""
 
 from .direction_field import Symmetry as Symmetry
 from .direction_field import direction_field as direction_field
