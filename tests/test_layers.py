@@ -18,8 +18,8 @@ FLOORS = (
     {"_graph"},
     {"_one_mesh", "boundary", "geometry", "polylines", "repair", "triangulation"},
     {"_exact_triangles", "curves", "energies", "io", "normalisation", "shapes", "subdivision"},
-    {"principal", "reflection", "self_intersections", "stars"},
-    {"constraints", "measuring", "viewing"},
+    {"fields", "principal", "reflection", "self_intersections", "stars"},
+    {"constraints", "measuring", "meshing", "viewing"},
     {"formfinding"},
     {"cli"},
 )

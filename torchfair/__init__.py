@@ -2,8 +2,9 @@
 
 The parts are imported by name: ``torchfair.geometry``, ``torchfair.energies``, ``torchfair.shapes``,
 ``torchfair.stars``, ``torchfair.subdivision``, ``torchfair.projection``, ``torchfair.constraints``,
-``torchfair.formfinding``, ``torchfair.principal``, ``torchfair.cameras``, ``torchfair.reflection``,
-``torchfair.viewing``, ``torchfair.measuring``, ``torchfair.progress``.
+``torchfair.formfinding``, ``torchfair.meshing``, ``torchfair.principal``,
+``torchfair.cameras``, ``torchfair.reflection``, ``torchfair.viewing``, ``torchfair.measuring``,
+``torchfair.progress``.
 """
 
 from .energies import AngleVariation as AngleVariation

@@ -14,6 +14,7 @@ from .picture_gauss_image import picture_gauss_image as picture_gauss_image
 from .picture_gauss_images import picture_gauss_images as picture_gauss_images
 from .picture_mesh import picture_mesh as picture_mesh
 from .picture_principal_edges import picture_principal_edges as picture_principal_edges
+from .picture_principal_mesh import picture_principal_mesh as picture_principal_mesh
 from .picture_pyramids import picture_pyramids as picture_pyramids
 from .picture_reflections import picture_reflection_differences as picture_reflection_differences
 from .picture_reflections import picture_reflections as picture_reflections

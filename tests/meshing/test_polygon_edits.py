@@ -1,0 +1,116 @@
+"""Collapses and merges that leave a manifold, and those that are refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers import grid_faces
+
+from torchfair import Topology
+from torchfair.meshing.boundary_cells import compact, tidy_boundary
+from torchfair.meshing.polygon_edits import PolygonEdits
+from torchfair.meshing.tracing import Cells
+
+
+def grid(rows: int = 4, columns: int = 4) -> tuple[np.ndarray, list[list[int]], np.ndarray]:
+    """Positions, quads, and which vertices are on the boundary."""
+    x, y = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
+    outer = (x == 0) | (y == 0) | (x == rows - 1) | (y == columns - 1)
+    positions = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1).astype(float)
+    return positions, grid_faces(rows, columns).tolist(), outer.ravel()
+
+
+def edits(rows: int = 4, columns: int = 4, fixed: tuple[int, ...] = ()) -> PolygonEdits:
+    positions, faces, outer = grid(rows, columns)
+    keep = np.zeros(len(positions), bool)
+    keep[list(fixed)] = True
+    return PolygonEdits(positions, faces, outer, keep)
+
+
+def is_disk(of: PolygonEdits) -> bool:
+    whole = compact(of)
+    topology = Topology.from_faces(whole.faces, len(whole.positions))
+    return topology.num_vertices - topology.num_edges + topology.num_faces == 1
+
+
+def test_a_collapse_ends_on_the_boundary() -> None:
+    found = edits()
+    assert found.collapse((5, 1), inner=True)
+    assert 5 not in found.around
+    assert found.positions[1].tolist() == [0, 1, 0]
+    assert is_disk(found)
+    assert found.place_of(5) == 1
+    assert compact(found).number[5] == compact(found).number[1] >= 0
+    assert sorted(map(len, found.faces.values())).count(3) == 2
+
+
+def test_fixed_nodes_stay() -> None:
+    found = edits(fixed=(5, 9))
+    assert not found.collapse((5, 9), inner=True)
+    assert found.collapse((5, 6), inner=True)
+    assert 5 in found.around
+    assert 6 not in found.around
+
+
+def test_a_surface_is_not_pinched() -> None:
+    """An inner edge between two boundary nodes: its collapse would leave two parts that touch in a point."""
+    found = edits(3, 2)
+    before = {number: list(face) for number, face in found.faces.items()}
+    assert not found.collapse((2, 3), inner=True)
+    assert found.faces == before
+    assert found.collapse((0, 1), inner=False)
+    assert is_disk(found)
+
+
+def test_the_last_face_does_not_vanish() -> None:
+    found = PolygonEdits(np.eye(3), [[0, 1, 2]], np.ones(3, bool), np.zeros(3, bool))
+    assert not found.collapse((0, 1), inner=False)
+    assert found.faces == {0: [0, 1, 2]}
+
+
+def test_faces_are_not_turned_over() -> None:
+    found = edits()
+    found.positions[5] = [2.5, 0.4, 0]  # folded beforehand: collapsing another edge must not count that as its side
+    found = PolygonEdits(found.positions, list(found.faces.values()), found.on_boundary, found.fixed)
+    start = {number: found.area(number) for number in found.faces}
+    found.collapse((6, 10), inner=True)
+    assert all(found.area(number) > 0 or start[number] <= 0 for number in found.faces)
+
+
+def test_merging() -> None:
+    found = edits()
+    assert found.across((0, 1), 0) is None
+    edge = next(edge for edge in found.sides(0) if found.across(edge, 0) is not None)
+    other = found.across(edge, 0)
+    assert found.merge(0, edge)
+    assert other not in found.faces
+    assert len(found.faces[0]) == 6
+    assert found.area(0) == pytest.approx(2)
+    assert is_disk(found)
+    found.drop_straight_nodes(0)
+    assert len(found.faces[0]) < 6  # corners of the grid that are used by this face only
+    assert is_disk(found)
+
+
+def test_slivers_and_short_edges_go() -> None:
+    """A row of quads a hundredth as high as the others along the boundary."""
+    positions, faces, outer = grid(5, 6)
+    positions[positions[:, 1] == 5, 1] = 4.01
+    corner = np.isin(np.arange(len(positions)), [0, 24, 5, 29])
+    on = [[0, 1, 0, 1] for _ in faces]
+    cells = Cells(positions, faces, on, outer, np.zeros(len(positions), bool), corner)
+    tidied, left, _ = compact(tidy_boundary(cells, 1.0, 1.0))
+    topology = Topology.from_faces(left, len(tidied))
+    assert topology.num_vertices - topology.num_edges + topology.num_faces == 1
+    assert topology.num_faces == 16
+    assert topology.is_quadrangular
+    assert tidied[:, 1].max() == 4.01
+    ends = tidied[topology.edges.numpy()]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min() > 0.3
+
+
+def test_bulges_over_one_line_are_dropped() -> None:
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    outer, corner = np.ones(4, bool), np.zeros(4, bool)
+    cells = Cells(positions, [[0, 1, 2, 3], [1, 0]], [[0, 1, 0, 1], [2, 0]], outer, corner, ~corner)
+    assert compact(tidy_boundary(cells, 1.0, 1.0)).faces == [[0, 1, 2, 3]]

@@ -1,0 +1,121 @@
+"""Triangle lattices: valences, principal edges, and what comes of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from meshing_tools import MonkeySaddle, ellipsoid, irregular, side_by_side
+
+from torchfair.formfinding import principal_symmetric
+from torchfair.meshing import MeshingSettings, TriangleMesh, principal_triangles
+from torchfair.meshing.cut_cells import cut_cells
+from torchfair.meshing.verification import shape_of
+from torchfair.shapes import PrincipalParaboloid, Torus
+
+SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
+
+
+def inner_valences(mesh: TriangleMesh) -> dict[int, int]:
+    inner = ~mesh.topology.is_boundary_vertex
+    values, counts = mesh.topology.valences[inner].unique(return_counts=True)
+    return dict(zip(values.tolist(), counts.tolist(), strict=True))
+
+
+def test_a_torus_has_valence_six_throughout() -> None:
+    vertices, topology = irregular(Torus(), 1500)
+    found = principal_triangles(vertices, topology, count=800)
+    assert inner_valences(found) == {6: found.topology.num_vertices}
+    assert shape_of(found.topology) == shape_of(topology)
+    assert found.principal.exceptions.numel() == 0
+    assert int(found.principal.mask.sum()) * 3 == found.topology.num_edges
+    assert found.report["angle_mean_degrees"] < 1
+    assert abs(found.report["faces"] / 800 - 1) < 0.15
+    stars = found.principal.stars()
+    assert len(stars.vertices) == found.topology.num_vertices
+    assert found.notes == []
+
+
+def test_an_ellipsoid_has_four_vertices_of_valence_three() -> None:
+    found = principal_triangles(*ellipsoid(), count=800)
+    valences = inner_valences(found)
+    assert valences.pop(3) == 4
+    assert valences.keys() == {6}
+    assert found.report["singular"] == {"0.5": 4}
+    assert found.report["total_index"] == 2
+    at = (found.vertices[:, None] == found.singular_points).all(-1).any(1)
+    assert found.topology.valences[at].tolist() == [3] * 4
+    assert found.principal.exceptions.numel() == 0
+
+
+def test_a_monkey_saddle_has_one_vertex_of_valence_nine() -> None:
+    found = principal_triangles(*irregular(MonkeySaddle(), 1200), count=600)
+    assert found.report["singular"] == {"-0.5": 1}
+    at = (found.vertices[:, None] == found.singular_points).all(-1).any(1)
+    assert found.topology.valences[at].tolist() == [9]
+
+
+def test_rows_are_half_shifted_and_lie_along_the_smaller_curvature() -> None:
+    """On z = (x^2 - y^2/2)/2 rows lie along y; in them vertices of one row are in the middle of those of the next."""
+    found = principal_triangles(*irregular(SADDLE, 2000), count=600)
+    assert found.principal.exceptions.numel() == 0
+    stars = found.principal.stars()
+    centre = found.vertices[stars.vertices]
+    principal = found.vertices[stars.principal] - centre[:, None]
+    assert (principal[..., 1].abs() > 5 * principal[..., 0].abs()).all()
+    others = found.vertices[stars.cospherical] - centre[:, None]
+    half = (others[..., 1].abs() / principal[..., 1].abs().mean(1, keepdim=True)).median()
+    assert float(half) == pytest.approx(0.5, abs=0.03)
+    assert found.report["row_distance"] == pytest.approx(np.sqrt(1 / 3 / (2 * 0.15)), abs=0.1)
+    assert found.report["variation_over_curvature"] < 1.2
+
+
+def test_energy_of_the_lattice_is_that_of_the_closed_form() -> None:
+    """E per area is |a| + |b| + |a| / (2 ratio^2): with that share of C the ratio is chosen."""
+    found = principal_triangles(*irregular(SADDLE, 3000), count=2500)
+    share, ratio = 1 / 3, found.report["row_distance"]
+    boundary = 1 - 2 / np.sqrt(found.report["faces"])  # edges there carry none
+    expected = 1 + share / (2 * ratio**2)
+    assert found.report["variation_over_curvature"] == pytest.approx(expected * boundary, rel=0.04)
+
+
+def test_principal_symmetric_starts_from_it() -> None:
+    found = principal_triangles(*irregular(Torus(), 1500), count=500)
+    result = principal_symmetric(found.vertices, found.principal, levels=0)
+    after = result.levels[-1].after
+    assert max(after["largest_cospherical"], after["largest_coplanar"]) < 1e-8
+    assert after["saddle_side_share"] == 1.0
+
+
+def test_components() -> None:
+    found = principal_triangles(*side_by_side(irregular(SADDLE), irregular(Torus())), count=800)
+    assert found.report["components"] == 2
+    assert found.report["euler_number"] == 1
+
+
+def test_types_come_back() -> None:
+    vertices, topology = irregular(SADDLE)
+    found = principal_triangles(vertices.float(), topology, spacing=0.2, settings=MeshingSettings(align_boundary=False))
+    assert found.vertices.dtype == torch.float32
+    assert found.topology.is_triangular
+
+
+def test_cells_are_cut_forward() -> None:
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 1, 0], [-0.5, 1, 0]])
+    forward = [[0, 1, 2], [0, 2, 3]]
+    assert cut_cells(positions, [[0, 1, 2, 3]], {(0, 1), (2, 3)}) == forward
+    turned = cut_cells(positions, [[2, 3, 0, 1]], {(0, 1), (2, 3)})  # half a turn: the same diagonal
+    assert {frozenset(t) for t in turned} == {frozenset(t) for t in forward}
+    other = cut_cells(positions, [[1, 2, 3, 0]], {(0, 1), (2, 3)})
+    assert {frozenset(t) for t in other} == {frozenset(t) for t in forward}
+    back = cut_cells(positions, [[0, 1, 2, 3]], {(1, 2), (0, 3)})  # rows the other way: the other diagonal
+    assert {frozenset(t) for t in back} == {frozenset({1, 2, 3}), frozenset({0, 1, 3})}
+
+
+def test_clipped_cells_are_cut_without_turning_triangles_over() -> None:
+    bent = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.2, 0], [0, 2, 0]])
+    triangles = cut_cells(bent, [[0, 1, 2, 3, 4]], set())
+    assert len(triangles) == 3
+    areas = [np.cross(bent[b] - bent[a], bent[c] - bent[a])[2] / 2 for a, b, c in triangles]
+    assert min(areas) > 0
+    assert sum(areas) == pytest.approx(2.2)

@@ -1,0 +1,176 @@
+"""``torchfair mesh``: quads or triangles along the principal directions of a surface."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .arguments import positive_count
+from .errors import CommandError
+from .exit_codes import EXIT_NOT_REACHED, EXIT_OK, IN_WORDS
+from .inputs import add_repair, read_input
+from .mesh_planar import PlanarMesh, made_planar
+from .options import SettingOptions
+from .outputs import Outputs, Request, Writer
+from .parser import CommandParser
+
+if TYPE_CHECKING:
+    from ..meshing import MeshingSettings, QuadMesh, TriangleMesh
+
+    Made = QuadMesh | TriangleMesh | PlanarMesh
+
+NAME = "torchfair mesh"
+_DESCRIPTION = (
+    "Makes a mesh of a surface whose edges follow its principal curvature lines: quads, which are then nearly planar "
+    "and have the least E of all, or a half-shifted lattice of triangles, from which 'torchfair symmetric' starts. "
+    "Vertices lie on the surface; corners of the boundary stay, and parts of it that follow a direction become lines "
+    "of the mesh. The topology is that of the surface, or nothing is written."
+)
+_ROWS = {
+    "faces": "faces",
+    "quads": "  quads among them",
+    "angle_mean_degrees": "angle to principal directions, mean, degrees",
+    "angle_95_degrees": "... 95 %",
+    "planarity_mean": "planarity, mean",
+    "planarity_max": "... largest",
+    "normal_variation": "E",
+    "total_absolute_curvature": "C of the surface",
+    "variation_over_curvature": "E/C",
+    "distance_max": "largest distance from the surface, in mean edges",
+}
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds ``mesh`` to the commands."""
+    parser: CommandParser = subparsers.add_parser(
+        "mesh",
+        help="mesh a surface along its principal directions",
+        description=_DESCRIPTION,
+        epilog=IN_WORDS,
+        allow_abbrev=False,
+        fill=fill,
+    )
+    parser.set_defaults(run=run, name=NAME)
+
+
+def fill(parser: CommandParser) -> None:
+    """Adds the arguments."""
+    add = parser.add_argument
+    add("input", metavar="INPUT", help="mesh file of a surface, or a built-in example:NAME")
+    add_repair(parser)
+    add("--quads", type=positive_count, metavar="N", help="about so many quads")
+    add("--triangles", type=positive_count, metavar="N", help="about so many triangles, with principal edges")
+    add("--planar", action="store_true", help="move vertices near the surface until all polygons are planar, as "
+        "'torchfair fair --planar quads' does")  # fmt: skip
+    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
+    add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
+    add("--no-pictures", action="store_true", help="write no pictures")
+    add("--force", action="store_true", help="replace files that exist")
+    options().add_to(parser)
+
+
+def options() -> SettingOptions[MeshingSettings]:
+    """The options that are settings."""
+    from ..meshing import MeshingSettings
+
+    return SettingOptions(MeshingSettings, "mesh", {})
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Checks what can be checked first, then reads, meshes, writes and prints."""
+    if (arguments.quads is None) == (arguments.triangles is None):
+        raise CommandError("give one of --quads N and --triangles N")
+    if arguments.planar and arguments.triangles:
+        raise CommandError("--planar is for --quads: triangles are planar")
+    settings = options().settings(arguments)
+    outputs = MeshOutputs(arguments, {"mesh.png": _singular, "edges.png": _edges})
+    outputs.prepare()
+    surface = read_input(arguments.input, arguments.repair)
+    outputs.make_folders()
+    began = time.perf_counter()
+    made, missed = _made(surface.vertices, surface.topology, arguments, settings)
+    request = Request(surface, {})
+    outputs.write_mesh(request, made)
+    lines = [*(f"repaired: {sentence}" for sentence in surface.repairs), *(f"note: {note}" for note in made.notes)]
+    print("\n".join([*lines, *_table(made.report)]), flush=True)
+    outputs.write_others(_report(arguments, made, settings, missed, time.perf_counter() - began), request, made)
+    print("\n".join([*(f"wrote {path}" for path in outputs.paths()), *missed]))
+    return EXIT_NOT_REACHED if missed else EXIT_OK
+
+
+def _made(vertices: Any, topology: Any, arguments: argparse.Namespace, settings: Any) -> tuple[Made, list[str]]:
+    from ..meshing import principal_quads, principal_triangles
+
+    if arguments.triangles:
+        return principal_triangles(vertices, topology, count=arguments.triangles, settings=settings), []
+    quads = principal_quads(vertices, topology, count=arguments.quads, settings=settings)
+    return made_planar(quads, (vertices, topology)) if arguments.planar else (quads, [])
+
+
+class MeshOutputs(Outputs):
+    """The mesh, with principal edges in it or beside it, report and pictures."""
+
+    def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
+        super().__init__(arguments, pictures)
+        if arguments.triangles and self.mesh.suffix.lower() != ".obj":
+            self.beside = {self.mesh.with_suffix(".edges.json"): _labels}
+
+    def polylines(self, result: Any) -> Any:
+        """Principal edges, unless they stand in a file beside."""
+        return [] if self.beside or not hasattr(result, "principal") else result.principal.polylines()
+
+
+def _labels(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+    from ..io import save_edge_labels
+
+    save_edge_labels(path, result.topology, result.principal.mask, overwrite=overwrite)
+
+
+def _singular(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+    from ..viewing import picture_principal_edges, picture_principal_mesh
+
+    if hasattr(result, "principal"):
+        picture_principal_edges(path, {"principal edges": (result.vertices, result.principal)}, overwrite=overwrite)
+        return
+    points, indices = result.singular_points, result.singular_indices
+    picture_principal_mesh(path, result.vertices, result.topology, points, indices, overwrite=overwrite)
+
+
+def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+    from ..viewing import picture_edges
+
+    meshes = {"surface": request.mesh.vertices, "mesh": result.vertices}
+    picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
+
+
+def _table(report: Mapping[str, Any]) -> list[str]:
+    width = max(map(len, _ROWS.values()))
+    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items()]
+    found = ", ".join(f"{count} of index {index}" for index, count in report["singular"].items())
+    return [*lines, f"{'singular points':<{width}}  {found or 'none':>10}"]
+
+
+def _shown(value: float | None) -> str:
+    return "-" if value is None else str(value) if isinstance(value, int) else f"{value:.4g}"
+
+
+def _report(
+    arguments: argparse.Namespace, made: Made, settings: Any, missed: list[str], seconds: float
+) -> dict[str, Any]:
+    from ..settings import plain_settings
+
+    names = ("input", "quads", "triangles", "planar", "output")
+    return {
+        "job": "mesh",
+        "request": {name: getattr(arguments, name) for name in names},
+        "settings": plain_settings(settings),
+        "measures": made.report,
+        "singular_points": made.singular_points,
+        "singular_indices": made.singular_indices,
+        "notes": list(made.notes),
+        "not_reached": missed,
+        "seconds": seconds,
+    }

@@ -1,0 +1,82 @@
+"""Principal directions in triangles, as complex numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from torch import Tensor
+
+from .._graph import graph_laplacian
+from ..geometry import corrected_shape_operators, vertex_areas
+from ..topology import Topology
+from .frames import Complexes, FaceFrames, Floats, Ints
+
+_FLOOR = 0.1  # of the mean curvature: a difference of curvatures below that is nothing to go by
+_FLATTEST = 1e-3  # radius of curvature over the size of the surface beyond which it counts as flat, inverted
+_MOST = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Principal directions of the triangles of a mesh.
+
+    Attributes:
+        values: (F,) traceless shape operators in the frames: half the difference of the principal curvatures, at twice
+            the angle of the direction in which the surface bends by the larger curvature (positive where convex).
+        means: (F,) mean curvatures.
+        confidence: (F,) from 0 at umbilics and in flat places, over 1 where curvatures differ as much as in
+            the mean, to 1.5.
+    """
+
+    values: Complexes
+    means: Floats
+    confidence: Floats
+
+
+def directions_of(vertices: Tensor, topology: Topology, frames: FaceFrames, rings: int = 1) -> Directions:
+    """Directions by corrected shape operators, each the sum over a star, then over ``rings`` rings of neighbours.
+
+    Args:
+        vertices: (V, 3) positions.
+        topology: a triangle mesh.
+        frames: its frames.
+        rings: 0 for one star, 1 for smooth surfaces, up to about 5 where there is noise.
+    """
+    points = vertices.detach().cpu().double()
+    operators = corrected_shape_operators(points, frames.topology).flatten(-2).numpy()
+    areas = vertex_areas(points, frames.topology).numpy()
+    if rings:
+        laplacian = graph_laplacian(frames.topology)
+        near = laplacian.copy()
+        near.data = np.ones_like(near.data)
+        for _ in range(rings):
+            operators, areas = near @ operators, near @ areas
+    whole = operators[frames.triangles].sum(1).reshape(-1, 3, 3) / areas[frames.triangles].sum(1)[:, None, None]
+    axes = np.stack([frames.first, frames.second], axis=1)
+    plane = axes @ whole @ axes.transpose(0, 2, 1)
+    # Shape operators of stars have the directions exchanged: half a turn of the doubled angle.
+    values = -(plane[:, 0, 0] - plane[:, 1, 1] + 1j * (plane[:, 0, 1] + plane[:, 1, 0])) / 2
+    means = (plane[:, 0, 0] + plane[:, 1, 1]) / 2
+    return Directions(values, means, _confidence(values, means, frames.areas))
+
+
+def _confidence(values: Complexes, means: Floats, areas: Floats) -> Floats:
+    total = areas.sum()
+    differs, bends = (np.sqrt((np.abs(of) ** 2 * areas).sum() / total) for of in (values, means))
+    scale = max(differs, _FLOOR * bends, _FLATTEST / np.sqrt(total))
+    return np.asarray(np.minimum((np.abs(values) / scale) ** 2, _MOST))
+
+
+def carried_directions(directions: Directions, frames: FaceFrames, finer: FaceFrames, parents: Ints) -> Directions:
+    """Directions of finer triangles, those of the triangles that they lie in.
+
+    Args:
+        directions: of the coarse mesh.
+        frames: of the coarse mesh.
+        finer: frames of the fine mesh.
+        parents: (F',) coarse triangle of every fine one, in the same plane.
+    """
+    x, y = ((frames.first[parents] * axis).sum(1) for axis in (finer.first, finer.second))
+    turned = directions.values[parents] * np.exp(2j * np.arctan2(y, x))
+    return Directions(turned, directions.means[parents], directions.confidence[parents])

@@ -1,0 +1,127 @@
+"""Singular vertices that are too close to each other are merged."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import dijkstra
+
+from .direction_field import Symmetry, connection_laplacian, hermitian_solve
+from .directions import Directions
+from .frames import Bools, FaceFrames, Floats, Ints
+from .matchings import QUARTER, vertex_charges
+
+_LOOSE = 0.05  # confidence beside moved singular vertices, relative
+_RINGS = 2  # around them
+_ROUNDS = 8
+_MOST_NEGATIVE = -4  # four times the index of a merged vertex: eight quads meet
+
+
+def merge_singularities(
+    frames: FaceFrames,
+    angles: Floats,
+    matched: Ints,
+    directions: Directions,
+    smoothing: float,
+    radius: float,
+    symmetry: Symmetry = 4,
+) -> tuple[Floats, Ints]:
+    """Merges singular vertices of a field within a radius: opposite ones cancel, negative ones become one.
+
+    Two vertices of valence 5 become one of valence 6, as at a monkey saddle, four one of valence 8. The change is one
+    of whole numbers along a shortest path; angles are solved for again.
+
+    Args:
+        frames: of the triangles.
+        angles: (F,) of the field.
+        matched: (I,) quarter turns over edges.
+        directions: principal directions.
+        smoothing: as for the field.
+        radius: along edges.
+        symmetry: of the field, 2 or 4.
+
+    Returns:
+        Angles (F,) and matchings (I,); those given, where nothing is to be merged.
+    """
+    corners, size = frames.triangles.ravel(), len(frames.points)
+    trust = np.bincount(corners, np.repeat(directions.confidence, 3), size) / np.maximum(
+        np.bincount(corners, minlength=size), 1
+    )
+    moved, touched = matched, np.zeros(size, bool)
+    for _ in range(_ROUNDS):
+        again, beside = _merged(frames, moved, vertex_charges(frames, angles, moved), trust, radius)
+        if not beside.any():
+            break
+        moved, touched = again, touched | beside
+    if not touched.any():
+        return angles, matched
+    return _refit(frames, angles, moved, directions, smoothing, touched, symmetry), moved
+
+
+def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, radius: float) -> tuple[Ints, Bools]:
+    """Matchings with pairs of singular vertices moved to where directions are trusted least on the way between them."""
+    size = len(frames.points)
+    touched = np.zeros(size, bool)
+    singular = np.flatnonzero(charges)
+    if len(singular) < 2:
+        return matched, touched
+    inner = ~frames.is_boundary[frames.edges].any(1)
+    (v, w), lengths = frames.edges[inner].T, frames.lengths[inner]
+    graph = sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(size, size))
+    distance, before = dijkstra(graph, indices=singular, limit=radius, return_predecessors=True)
+    number = {(int(a), int(b)): e for e, (a, b) in enumerate(frames.edges)}
+    near = distance[:, singular]
+    rows, columns = np.nonzero(np.triu(np.isfinite(near), 1))
+    moved, free = matched.copy(), set(singular.tolist())
+    for place in np.argsort(near[rows, columns], kind="stable"):
+        row, goal = rows[place], int(singular[columns[place]])
+        start = int(singular[row])
+        together = charges[start] + charges[goal]
+        if start not in free or goal not in free or not _MOST_NEGATIVE <= together <= 0:
+            continue
+        free -= {start, goal}
+        path = [goal]
+        while path[-1] != start:
+            path.append(int(before[row, path[-1]]))
+        middle = int(np.argmin(trust[path]))
+        # The charge of a vertex goes from one end of an edge to the other: a step more or less over the edge.
+        steps = [(a, b, int(charges[goal])) for a, b in itertools.pairwise(path[: middle + 1])]
+        steps += [(b, a, int(charges[start])) for a, b in itertools.pairwise(path[middle:])]
+        for a, b, charge in steps:
+            if (a, b) in number:
+                moved[number[a, b]] -= charge
+            else:
+                moved[number[b, a]] += charge
+        touched[path] = True
+    return moved, touched
+
+
+def _refit(
+    frames: FaceFrames,
+    angles: Floats,
+    matched: Ints,
+    directions: Directions,
+    smoothing: float,
+    touched: Bools,
+    symmetry: Symmetry,
+) -> Floats:
+    """Angles that fit new matchings, by the smoothness and the principal directions of the field."""
+    near = touched[frames.triangles].any(1)
+    for _ in range(_RINGS):
+        beside = np.zeros(len(frames.points), bool)
+        beside[frames.triangles[near]] = True
+        near = beside[frames.triangles].any(1)
+    trust = directions.confidence * np.where(near, _LOOSE, 1.0)
+    pull = frames.areas * trust / smoothing**2 + 1e-9 * frames.areas / frames.areas.mean()
+    stiffness = connection_laplacian(frames, np.ones(len(frames.faces), complex)) + sp.diags(pull)
+    turning = frames.dual_weights * (frames.turns + QUARTER * matched)
+    f, g = frames.faces.T
+    count = len(frames.triangles)
+    jumps = np.bincount(g, turning, count) - np.bincount(f, turning, count)
+    principal, step = np.angle(directions.values) / 2, 2 * np.pi / symmetry
+    for _ in range(2):
+        nearest = principal + step * np.rint((angles - principal) / step)
+        angles = hermitian_solve(stiffness, pull * nearest + jumps + 0j).real
+    return angles

@@ -1,0 +1,117 @@
+"""Stretches of the boundary that nearly follow the field become lines of the mesh."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..fields.frames import Bools, FaceFrames, Floats, Ints
+from ..fields.matchings import QUARTER
+from .cut_graph import CutGraph
+from .seams import Seams
+
+_INWARD = 1e-6  # by which a run lies inside its line, so that no cell is left beyond it
+
+
+class BoundaryRun(NamedTuple):
+    """Boundary edges along which one coordinate is the same whole number.
+
+    Attributes:
+        component: 0 if the first coordinate is constant, 1 if the second.
+        corners: face and corner of the starts and ends of the edges.
+    """
+
+    component: int
+    corners: list[tuple[int, int]]
+
+
+def find_runs(
+    frames: FaceFrames, graph: CutGraph, angle: float, shortest: float, components: tuple[int, ...] = (0, 1)
+) -> list[BoundaryRun]:
+    """Longest stretches of the boundary that follow the field, cut where the mesh is cut.
+
+    Args:
+        frames: of the triangles.
+        graph: the cut.
+        angle: largest angle between an edge and the field, radians.
+        shortest: length of a stretch that counts.
+        components: coordinates whose lines run along or across the field.
+    """
+    topology = frames.topology
+    edge_of = topology.corner_edges.numpy()
+    outer = np.flatnonzero(edge_of >= topology.num_interior_edges)
+    corner_from = np.full(topology.num_vertices, -1)
+    corner_from[topology.corners.numpy()[outer]] = outer
+    turned = _turned_around(frames, graph)
+    runs: list[BoundaryRun] = []
+    for loop in topology.boundary_loops():
+        corners = corner_from[loop.numpy()]
+        quarter, off, length = _against_field(frames, graph, corners)
+        goes_on = (
+            (quarter == (np.roll(quarter, 1) - turned[loop.numpy()]) % 4) & (off <= angle) & np.roll(off <= angle, 1)
+        )
+        for stretch in _stretches(off <= angle, goes_on):
+            if length[stretch].sum() >= shortest:
+                runs += _cut_where_frames_turn(corners[stretch], quarter[stretch])
+    return [run for run in runs if run.component in components]
+
+
+def _turned_around(frames: FaceFrames, graph: CutGraph) -> Ints:
+    """(V,) quarter turns from the last face around a boundary vertex, clockwise to the first."""
+    size = len(frames.points)
+    start, end = frames.edges.T
+    quarters = graph.quarters.astype(float)
+    turned = np.bincount(start, quarters, size) - np.bincount(end, quarters, size)
+    return np.asarray(np.rint(turned), np.int64)
+
+
+def _against_field(frames: FaceFrames, graph: CutGraph, corners: Ints) -> tuple[Ints, Floats, Floats]:
+    """Of boundary edges that start at corners: nearest direction of the field (0 to 3), angle to it, length."""
+    face, corner = corners // 3, corners % 3
+    start = frames.points[frames.triangles[face, corner]]
+    along = frames.points[frames.triangles[face, (corner + 1) % 3]] - start
+    x, y = ((along * axis[face]).sum(1) for axis in (frames.first, frames.second))
+    against = np.arctan2(y, x) - graph.angles[face]
+    nearest = np.rint(against / QUARTER)
+    return nearest.astype(np.int64) % 4, np.abs(against - nearest * QUARTER), np.hypot(x, y)
+
+
+def _stretches(follows: Bools, goes_on: Bools) -> list[Ints]:
+    """Numbers along a loop of edges that follow the field and go on from each other, in order."""
+    count = len(follows)
+    if goes_on.all():
+        return [np.arange(count)]
+    first = int(np.flatnonzero(~goes_on)[0])
+    order = (first + np.arange(count)) % count
+    pieces = np.split(order, np.flatnonzero(~goes_on[order])[1:])
+    return [piece for piece in pieces if follows[piece[0]]]
+
+
+def _cut_where_frames_turn(corners: Ints, quarter: Ints) -> list[BoundaryRun]:
+    """One run for every part in one frame; parts share the vertex between them, so that they stay one line."""
+    parts = np.split(np.arange(len(corners)), np.flatnonzero(np.diff(quarter)) + 1)
+    runs = []
+    for part in parts:
+        ends = [(int(c) // 3, (int(c) % 3 + shift) % 3) for c in corners[part] for shift in (0, 1)]
+        # Along the first axis of the field, quarter 0 or 2, the second coordinate is constant.
+        runs.append(BoundaryRun(1 - int(quarter[part[0]]) % 2, ends))
+    return runs
+
+
+def inward_moves(seams: Seams, values: np.ndarray, triangles: Ints, runs: list[BoundaryRun]) -> np.ndarray:
+    """(V,) complex: moves of the vertices on runs into the surface, for their values, not those of copies."""
+    moves: np.ndarray = np.zeros(int(triangles.max()) + 1, complex)
+    for run in runs:
+        axis = 1j if run.component else 1.0
+        for (face, start), (_, end) in zip(run.corners[::2], run.corners[1::2], strict=True):
+            copies = seams.copies[face]
+            into = (values[copies[3 - start - end]] - values[copies[start]]) / axis
+            for corner in (start, end):
+                move = _INWARD * np.sign(into.real) * axis * seams.unit[copies[corner]].conjugate()
+                vertex = triangles[face, corner]
+                for unit in (1.0, 1j):
+                    part = (move / unit).real
+                    if part:
+                        moves[vertex] += part * unit - (moves[vertex] / unit).real * unit
+    return moves

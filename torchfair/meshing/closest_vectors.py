@@ -1,0 +1,123 @@
+"""Whole vectors close to a given one in a quadratic norm."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+_MOST_REDUCED = 250  # unknowns; the basis of a larger lattice is taken as it is
+_MOST_SWAPS = 20_000
+_LOVASZ = 0.9
+
+
+class WholeVectors(NamedTuple):
+    """Whole vectors (n, size), the closest first, and their squared distances (n,)."""
+
+    vectors: Ints
+    costs: Floats
+
+
+def closest_vectors(metric: Floats, target: Floats, beam: int = 64) -> WholeVectors:
+    """Whole vectors ``y`` with small ``(y - target)^T metric (y - target)``.
+
+    In a reduced basis unknowns are rounded one after the other, the most certain first, each followed by the best
+    answer of the others; of the branches the ``beam`` best are kept.
+
+    Args:
+        metric: (size, size) positive definite.
+        target: (size,).
+        beam: number of vectors.
+    """
+    size = len(target)
+    if not size:
+        return WholeVectors(np.zeros((1, 0), np.int64), np.zeros(1))
+    basis = reduced_basis(metric)
+    inverse = np.rint(np.linalg.inv(basis.astype(float)))
+    if (np.rint(basis @ inverse) != np.eye(size)).any():
+        basis, inverse = np.eye(size, dtype=np.int64), np.eye(size)
+    reduced = basis.T @ metric @ basis
+    reduced = (reduced + reduced.T) / 2 + np.eye(size) * 1e-12 * np.trace(reduced) / size
+    answers = np.linalg.inv(reduced)
+    order, columns = _certain_first((answers + answers.T) / 2, inverse @ target)
+    branches, costs = (inverse @ target)[None], np.zeros(1)
+    for (unknown, stiffness), column in zip(order, columns, strict=True):
+        here = branches[:, unknown]
+        nearest = np.rint(here)
+        side = np.where(here >= nearest, 1, -1)
+        values = nearest[:, None] + side[:, None] * np.array([0, 1, -1, 2, -2])
+        moves = values - here[:, None]
+        total = costs[:, None] + moves**2 / stiffness
+        best = np.argsort(total.ravel(), kind="stable")[:beam]
+        row, choice = np.unravel_index(best, total.shape)
+        branches = branches[row] + moves[row, choice][:, None] * column
+        branches[:, unknown] = values[row, choice]
+        costs = total.ravel()[best]
+    return WholeVectors(np.rint(branches).astype(np.int64) @ basis.T, costs)
+
+
+def _certain_first(answers: Floats, target: Floats) -> tuple[list[tuple[int, float]], list[Floats]]:
+    """Order of rounding, the inverse stiffness of each unknown when its turn comes, and how the others answer."""
+    size = len(target)
+    free = np.ones(size, bool)
+    order, columns = [], []
+    answers, values = answers.copy(), target.copy()
+    for _ in range(size):
+        moves = np.rint(values) - values
+        stiffness = np.maximum(np.diag(answers), 1e-300)
+        unknown = int(np.argmin(np.where(free, moves**2 / stiffness, np.inf)))
+        column = answers[:, unknown] / stiffness[unknown]
+        order.append((unknown, float(stiffness[unknown])))
+        columns.append(column.copy())
+        values = values + column * moves[unknown]
+        values[unknown] = np.rint(values[unknown])
+        free[unknown] = False
+        answers = answers - np.outer(column, answers[unknown])
+        answers[unknown] = answers[:, unknown] = 0
+    return order, columns
+
+
+def reduced_basis(metric: Floats) -> Ints:
+    """Columns of short, nearly orthogonal whole vectors in a quadratic norm (Lenstra, Lenstra, Lovasz 1982)."""
+    size = len(metric)
+    basis: Ints = np.eye(size, dtype=np.int64)
+    if size > _MOST_REDUCED:
+        return basis
+    values, vectors = np.linalg.eigh(metric)
+    root = (vectors * np.sqrt(np.maximum(values, values.max() * 1e-12))).T
+    triangle = np.linalg.qr(root, mode="r")
+    squares = np.diag(triangle) ** 2
+    shares = (triangle / np.diag(triangle)[:, None]).T.copy()
+
+    def subtract(k: int, j: int) -> None:
+        times = round(float(shares[k, j]))
+        if times:
+            basis[:, k] -= times * basis[:, j]
+            shares[k, :j] -= times * shares[j, :j]
+            shares[k, j] -= times
+
+    k = 1
+    for _ in range(_MOST_SWAPS):
+        if k >= size:
+            break
+        subtract(k, k - 1)
+        share = shares[k, k - 1]
+        if squares[k] >= (_LOVASZ - share**2) * squares[k - 1]:
+            for j in range(k - 2, -1, -1):
+                subtract(k, j)
+            k += 1
+            continue
+        total = squares[k] + share**2 * squares[k - 1]
+        shares[k, k - 1] = share * squares[k - 1] / total
+        squares[k], squares[k - 1] = squares[k - 1] * squares[k] / total, total
+        basis[:, [k - 1, k]] = basis[:, [k, k - 1]]
+        shares[[k - 1, k], : k - 1] = shares[[k, k - 1], : k - 1]
+        below = shares[k + 1 :, k].copy()
+        shares[k + 1 :, k] = shares[k + 1 :, k - 1] - share * below
+        shares[k + 1 :, k - 1] = below + shares[k, k - 1] * shares[k + 1 :, k]
+        k = max(k - 1, 1)
+    return basis

@@ -1,0 +1,145 @@
+"""All components of a surface: read, meshed with one spacing, and put together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from .._numbers import check_count, check_number
+from ..errors import SettingsError
+from ..fields import Directions, FaceFrames
+from ..fields.frames import Floats
+from ..topology import Topology
+from .ladder import mesh_component
+from .lattice import Lattice
+from .settings import MeshingSettings
+from .surface import DesignSurface, components_of
+from .verification import Shape, shape_of
+
+
+@dataclass(frozen=True, eq=False)
+class ReadSurface:
+    """A surface with its principal directions.
+
+    Attributes:
+        parts: components.
+        fields: directions of each.
+        rings: over how many rings curvature of each is averaged.
+        notes: what was found, in words.
+    """
+
+    parts: list[DesignSurface]
+    fields: list[Directions]
+    rings: list[int]
+    notes: list[str]
+
+    @cached_property
+    def whole(self) -> tuple[Tensor, Topology]:
+        """Triangles of all components in order."""
+        if len(self.parts) == 1:
+            return self.parts[0].vertices, self.parts[0].topology
+        offsets = np.cumsum([0, *(part.topology.num_vertices for part in self.parts)])
+        faces = [part.topology.triangles + int(offset) for part, offset in zip(self.parts, offsets, strict=False)]
+        vertices = torch.cat([part.vertices for part in self.parts])
+        return vertices, Topology.from_faces(torch.cat(faces), len(vertices))
+
+    @cached_property
+    def frames(self) -> FaceFrames:
+        """Of all components."""
+        return FaceFrames.of(*self.whole)
+
+    @cached_property
+    def directions(self) -> Directions:
+        """Of all components."""
+        return Directions(
+            np.concatenate([of.values for of in self.fields]),
+            np.concatenate([of.means for of in self.fields]),
+            np.concatenate([of.confidence for of in self.fields]),
+        )
+
+    @cached_property
+    def shape(self) -> Shape:
+        """Euler number, loops and components."""
+        return shape_of(self.whole[1])
+
+
+def read_surface(vertices: Tensor, topology: Topology, settings: MeshingSettings) -> ReadSurface:
+    """The components of a mesh with their directions. Errors as of :func:`principal_quads`."""
+    parts = components_of(vertices, topology)
+    found = [part.directions(settings.noise) for part in parts]
+    notes = [
+        f"{_name(number, len(parts))}the surface is rough: curvature averaged over {rings} rings"
+        for number, (_, rings) in enumerate(found)
+        if rings > 1 and settings.noise == "auto"
+    ]
+    return ReadSurface(parts, [of for of, _ in found], [rings for _, rings in found], notes)
+
+
+def spacing_of(surface: ReadSurface, face_area: float, count: int | None, spacing: float | None) -> float:
+    """The spacing asked for, or that of a count of faces, each with an area over the squared spacing.
+
+    Raises:
+        SettingsError: if neither or both are given, or one is out of range.
+    """
+    if (count is None) == (spacing is None):
+        raise SettingsError("give either count or spacing")
+    if spacing is not None:
+        check_number("spacing", spacing, above=True, finite=True)
+        return float(spacing)
+    check_count("count", count, least=1)
+    assert count is not None
+    return math.sqrt(math.fsum(part.frames.areas.sum() for part in surface.parts) / (count * face_area))
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """The meshes of all components as one.
+
+    Attributes:
+        positions: (V, 3).
+        faces: vertices counterclockwise.
+        rows: edges with the second coordinate constant, the smaller vertex first.
+        places: (n, 3) singular points.
+        indices: (n,) of the field.
+        notes: what was changed, in words.
+    """
+
+    positions: Floats
+    faces: list[list[int]]
+    rows: set[tuple[int, int]]
+    places: Tensor
+    indices: Tensor
+    notes: list[str]
+
+
+def mesh_components(surface: ReadSurface, lattices: list[Lattice], spacing: float, settings: MeshingSettings) -> Pieces:
+    """Meshes every component with a lattice.
+
+    Raises:
+        NoMeshError: if one has no valid mesh.
+    """
+    positions, faces, rows, places, indices, notes = [], [], set(), [], [], []
+    offset = 0
+    for number, (part, directions) in enumerate(zip(surface.parts, surface.fields, strict=True)):
+        smoothing = settings.smoothing_length(surface.rings[number])
+        mesh, words = mesh_component(part, directions, lattices[number], spacing, smoothing, settings)
+        if words:
+            name = _name(number, len(surface.parts))
+            notes.append(f"{name}not as asked for, which gave no valid mesh: {words}")
+        positions.append(mesh.positions)
+        faces += [[node + offset for node in face] for face in mesh.faces]
+        rows |= {(a + offset, b + offset) for a, b in mesh.rows}
+        places.append(mesh.singular_places)
+        indices.append(mesh.singular_charges / 4)
+        offset += len(mesh.positions)
+    at = torch.from_numpy(np.concatenate(places))
+    return Pieces(np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes)
+
+
+def _name(number: int, count: int) -> str:
+    return f"component {number + 1}: " if count > 1 else ""

@@ -1,0 +1,120 @@
+"""Where lines of whole numbers cross the edges of the triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..fields.frames import Bools, FaceFrames, Floats, Ints
+from .seamless_map import SeamlessMap
+from .seams import ROTATIONS
+
+_MARGIN = 1e-7  # by which vertices that are not singular stay off the lines
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Crossings of lines with edges, sorted along every edge; all decisions are made once, on its left side.
+
+    Lines are named by the coordinate that is constant on them, 0 or 1, and its whole value.
+
+    Attributes:
+        edge: (X,) edge of every crossing, in the numbering of the topology, boundary edges included.
+        along: (X,) from 0 to 1 along the edge.
+        offsets: (E+1,) first crossing of every edge.
+        coordinate, level: (X, 2) the line, seen from the left and from the right face.
+        values: (F, 3) complex coordinates of corners.
+    """
+
+    edge: Ints
+    along: Floats
+    offsets: Ints
+    coordinate: Ints
+    level: Ints
+    values: np.ndarray
+
+
+def find_crossings(found: SeamlessMap, values: np.ndarray) -> Crossings:
+    """The crossings of a seamless map, for values of copies off the lines."""
+    frames, at_corners = found.frames, values[found.seams.copies]
+    face, corner = left_corners(frames)
+    start, end = at_corners[face, corner], at_corners[face, (corner + 1) % 3]
+    parts = [_levels(getattr(start, part), getattr(end, part)) for part in ("real", "imag")]
+    edge, level, along = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    coordinate = np.repeat([0, 1], [len(part[0]) for part in parts])
+    order = np.lexsort((coordinate, along, edge))
+    edge, level, along, coordinate = edge[order], level[order], along[order], coordinate[order]
+    offsets = np.searchsorted(edge, np.arange(frames.topology.num_edges + 1))
+    other = _seen_from_right(found, edge, coordinate, level)
+    return Crossings(
+        edge, along, offsets, np.stack([coordinate, other[0]], 1), np.stack([level, other[1]], 1), at_corners
+    )
+
+
+def off_the_lines(found: SeamlessMap, inward: np.ndarray | None = None) -> np.ndarray:
+    """Values of copies, those of vertices that are not singular moved off whole numbers by a hair.
+
+    Args:
+        found: the map.
+        inward: (V,) complex, by how much vertices on boundary lines are to move into the surface, in the frame of
+            the value of the vertex.
+    """
+    seams, graph = found.seams, found.graph
+    own = np.zeros(len(graph.singular), complex)
+    is_own = np.ones(len(seams.vertex), bool)
+    is_own[list(seams.terms)] = [not seams.terms[c] and seams.unit[c] == 1 for c in seams.terms]
+    own[seams.vertex[is_own]] = found.values[is_own]
+    move = np.zeros(len(own), complex) if inward is None else inward.copy()
+    for part, factor in ((own.real, 1), (own.imag, 1j)):
+        to_line = part - np.rint(part)
+        close = (np.abs(to_line) < _MARGIN) & ((move.real if factor == 1 else move.imag) == 0)
+        move[close] += factor * (np.where(to_line[close] < 0, -_MARGIN, _MARGIN) - to_line[close])
+    move[graph.singular] = 0
+    return np.asarray(found.values + seams.unit * move[seams.vertex])
+
+
+def left_corners(frames: FaceFrames) -> tuple[Ints, Ints]:
+    """(E,) left face of every edge, boundary edges included, and its corner where the edge starts."""
+    topology = frames.topology
+    edge_of = topology.corner_edges.numpy()
+    outer = np.flatnonzero(edge_of >= topology.num_interior_edges)
+    face, corner = np.zeros((2, topology.num_edges), np.int64)
+    inner = topology.num_interior_edges
+    face[:inner], corner[:inner] = frames.faces[:, 0], frames.corners[:, 0]
+    face[edge_of[outer]], corner[edge_of[outer]] = outer // 3, outer % 3
+    return face, corner
+
+
+def _levels(start: Floats, end: Floats) -> tuple[Ints, Ints, Floats]:
+    """Whole numbers strictly between values at starts and ends: edges, numbers, places along the edge."""
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    first = np.floor(low).astype(np.int64) + 1
+    counts = np.maximum(np.ceil(high).astype(np.int64) - first, 0)
+    edge = np.repeat(np.arange(len(start)), counts)
+    level = np.repeat(first, counts) + np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return edge, level, (level - start[edge]) / (end - start)[edge]
+
+
+def _seen_from_right(found: SeamlessMap, edge: Ints, coordinate: Ints, level: Ints) -> tuple[Ints, Ints]:
+    """The lines in the coordinates of the right face; arbitrary on the boundary."""
+    inner = edge < len(found.frames.faces)
+    which = np.where(inner, edge, 0)
+    turn = (
+        np.array(ROTATIONS)[found.graph.quarters[which]] if len(found.graph.quarters) else np.ones(len(edge), complex)
+    )
+    step = found.translations[which] if len(found.graph.quarters) else np.zeros(len(edge), complex)
+    moved = turn * np.where(coordinate == 0, 1, 1j)  # the axis that is constant, turned
+    swaps = np.abs(moved.real) < 0.5
+    sign = np.where(swaps, moved.imag, moved.real)
+    shift = np.where(swaps, step.imag, step.real)
+    return np.where(swaps, 1, 0), np.rint(sign * level + shift).astype(np.int64)
+
+
+def sorted_groups(*keys: Ints) -> tuple[Ints, Bools]:
+    """An order by keys, the first counting most, and where in it a new combination starts."""
+    order = np.lexsort(keys[::-1])
+    starts = np.ones(len(order), bool)
+    if len(order):
+        starts[1:] = np.any([key[order][1:] != key[order][:-1] for key in keys], axis=0)
+    return order, starts

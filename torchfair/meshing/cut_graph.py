@@ -1,0 +1,138 @@
+"""A mesh cut open along paths, so that directions can be combed and a map to the plane has one value."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import dijkstra
+
+from ..fields.frames import Bools, FaceFrames, Floats, Ints
+from ..fields.matchings import QUARTER
+
+
+class PathEdge(NamedTuple):
+    """Place of a cut edge: the number of its path, and whether the path runs along the edge, not against it."""
+
+    path: int
+    along: bool
+
+
+@dataclass(frozen=True, eq=False)
+class CutGraph:
+    """Where a mesh is cut, and directions combed on what is left, which is a disk.
+
+    Attributes:
+        angles: (F,) angles of directions that agree over all edges but the cut ones.
+        quarters: (I,) quarter turns over edges, 0 to 3, 0 where there is no cut.
+        cut: (I,) bool.
+        charges: (V,) four times the index.
+        singular: (V,) bool: where it is not 0.
+        paths: place of every cut edge; all edges of a path turn alike.
+        num_paths: their number.
+    """
+
+    angles: Floats
+    quarters: Ints
+    cut: Bools
+    charges: Ints
+    singular: Bools
+    paths: dict[int, PathEdge]
+    num_paths: int
+
+
+def cut_open(frames: FaceFrames, angles: Floats, matched: Ints, charges: Ints) -> CutGraph:
+    """Cuts a connected mesh along a tree of shortest paths between its singular vertices, boundaries and handles.
+
+    Args:
+        frames: of the triangles.
+        angles: (F,) of the field.
+        matched: (I,) quarter turns over edges.
+        charges: (V,) of the vertices.
+    """
+    tree, order, parents = _dual_tree(frames)
+    turned = np.zeros(len(frames.triangles), np.int64)
+    left = frames.faces[:, 0]
+    for face in order[1:].tolist():
+        edge = parents[face]
+        step = matched[edge]
+        other = turned[frames.faces[edge].sum() - face]
+        turned[face] = other + step if left[edge] == face else other - step
+    f, g = frames.faces.T
+    quarters = matched + turned[g] - turned[f]
+    singular = charges != 0
+    cut = ~tree
+    _prune(frames, cut, singular)
+    paths, count = _paths(frames, cut, singular)
+    return CutGraph(angles + QUARTER * turned, quarters % 4, cut, charges, singular, paths, count)
+
+
+def _dual_tree(frames: FaceFrames) -> tuple[Bools, Ints, Ints]:
+    """Edges of a tree of shortest paths over the faces from the middle, faces in its order, and edges to parents."""
+    f, g = frames.faces.T
+    count = len(frames.triangles)
+    centres = frames.centres
+    lengths = np.linalg.norm(centres[f] - centres[g], axis=1)
+    graph = sp.csr_matrix((np.r_[lengths, lengths], (np.r_[f, g], np.r_[g, f])), shape=(count, count))
+    middle = int(np.argmin(((centres - frames.areas @ centres / frames.areas.sum()) ** 2).sum(1)))
+    distance, before = dijkstra(graph, True, np.array(middle), True)
+    number = np.full(count, -1)
+    edges = np.arange(len(f))
+    towards_g, towards_f = before[g] == f, before[f] == g
+    number[g[towards_g]] = edges[towards_g]
+    number[f[towards_f]] = edges[towards_f]
+    tree = np.zeros(len(f), bool)
+    tree[number[number >= 0]] = True
+    return tree, np.argsort(distance, kind="stable"), number
+
+
+def _prune(frames: FaceFrames, cut: Bools, singular: Bools) -> None:
+    """Takes loose ends off the cut, in place: those that reach neither a singular vertex nor the boundary."""
+    edges = frames.edges.tolist()
+    around: dict[int, list[int]] = defaultdict(list)
+    for edge in np.flatnonzero(cut).tolist():
+        for vertex in edges[edge]:
+            around[vertex].append(edge)
+    stays = singular | frames.is_boundary
+    loose = [vertex for vertex, at in around.items() if len(at) == 1 and not stays[vertex]]
+    while loose:
+        vertex = loose.pop()
+        if len(around[vertex]) != 1:
+            continue
+        edge = around[vertex].pop()
+        cut[edge] = False
+        other = edges[edge][0] + edges[edge][1] - vertex
+        around[other].remove(edge)
+        if len(around[other]) == 1 and not stays[other]:
+            loose.append(other)
+
+
+def _paths(frames: FaceFrames, cut: Bools, singular: Bools) -> tuple[dict[int, PathEdge], int]:
+    """Cut edges in runs between nodes: singular and boundary vertices, and those where not two cut edges meet."""
+    edges = frames.edges.tolist()
+    around: dict[int, list[int]] = defaultdict(list)
+    cut_edges = np.flatnonzero(cut).tolist()
+    for edge in cut_edges:
+        for vertex in edges[edge]:
+            around[vertex].append(edge)
+    is_node = {v: len(at) != 2 or bool(singular[v]) or bool(frames.is_boundary[v]) for v, at in around.items()}
+    places: dict[int, PathEdge] = {}
+    count = 0
+    nodes = [vertex for vertex, is_one in is_node.items() if is_one]
+    starts = [(vertex, edge) for vertex in nodes for edge in around[vertex]]
+    for vertex, edge in starts + [(edges[edge][0], edge) for edge in cut_edges]:
+        if edge in places:
+            continue
+        here, at = vertex, edge
+        while at not in places:
+            places[at] = PathEdge(count, edges[at][0] == here)
+            here = edges[at][0] + edges[at][1] - here
+            if is_node[here]:
+                break
+            first, second = around[here]
+            at = second if first == at else first
+        count += 1
+    return places, count

@@ -1,0 +1,178 @@
+"""Polygons whose edges can be collapsed and which can be merged, one at a time, without leaving the manifold."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..fields.frames import Bools, Floats
+
+Edge = tuple[int, int]
+
+
+class PolygonEdits:
+    """Faces as lists of nodes that change; every change is checked before it is made.
+
+    Args:
+        positions: (N, 3), changed in place.
+        faces: nodes counterclockwise, each at least three.
+        on_boundary: (N,) bool, changed in place.
+        fixed: (N,) bool: nodes that keep their places.
+    """
+
+    def __init__(self, positions: Floats, faces: list[list[int]], on_boundary: Bools, fixed: Bools) -> None:
+        self.positions, self.on_boundary, self.fixed = positions, on_boundary, fixed
+        self.faces = {number: list(face) for number, face in enumerate(faces)}
+        self.went: dict[int, int] = {}
+        self.around: dict[int, set[int]] = defaultdict(set)
+        for number, face in self.faces.items():
+            for node in face:
+                self.around[node].add(number)
+        self.normals = {number: self.area_vector(face) for number, face in self.faces.items()}
+
+    def place_of(self, node: int) -> int:
+        """The node that a node was collapsed to, itself if it was not."""
+        while node in self.went:
+            node = self.went[node]
+        return node
+
+    def area_vector(self, face: list[int]) -> Floats:
+        """Of a polygon."""
+        x, y, z = self.positions[face].T
+        a, b, c = np.roll(x, -1), np.roll(y, -1), np.roll(z, -1)
+        return np.array([y @ c - z @ b, z @ a - x @ c, x @ b - y @ a]) / 2
+
+    def area(self, number: int) -> float:
+        """Of a face, along the normal that it had at first."""
+        first = self.normals[number]
+        size = float(np.linalg.norm(first))
+        return float(self.area_vector(self.faces[number]) @ first) / size if size else 0.0
+
+    def boundary_faces(self) -> list[int]:
+        """Faces with a node on the boundary."""
+        return [number for number, face in self.faces.items() if self.on_boundary[face].any()]
+
+    def sides(self, number: int) -> Iterator[Edge]:
+        """The edges of a face."""
+        face = self.faces[number]
+        return zip(face, face[1:] + face[:1], strict=True)
+
+    def across(self, edge: Edge, number: int) -> int | None:
+        """The face on the other side of an edge of a face; None at the boundary."""
+        others = [f for f in self.around[edge[0]] & self.around[edge[1]] if f != number and self._has(f, edge[::-1])]
+        return others[0] if len(others) == 1 else None
+
+    def _has(self, number: int, edge: Edge) -> bool:
+        return edge in set(self.sides(number))
+
+    def length(self, edge: Edge) -> float:
+        """Of an edge."""
+        return float(np.linalg.norm(self.positions[edge[0]] - self.positions[edge[1]]))
+
+    def collapse(self, edge: Edge, inner: bool) -> bool:
+        """Collapses an edge to the end that is to stay: a fixed one, or one on the boundary.
+
+        Args:
+            edge: two nodes.
+            inner: whether it has faces on both sides.
+
+        Returns:
+            Whether that left a manifold without faces turned over; otherwise nothing has changed.
+        """
+        stays, goes = edge
+        if self._rank(goes) > self._rank(stays):
+            stays, goes = goes, stays
+        if self.fixed[goes] or (inner and self.on_boundary[stays] and self.on_boundary[goes]):
+            return False
+        changed: dict[int, list[int]] = {}
+        for number in self.around[stays] | self.around[goes]:
+            face = [stays if node == goes else node for node in self.faces[number]]
+            face = [node for k, node in enumerate(face) if node != face[k - 1]]
+            if len(set(face)) != len(face):
+                return False
+            changed[number] = face if len(face) >= 3 else []
+        return self._allowed(changed) and self._apply(changed, goes, bool(self.on_boundary[goes]), stays)
+
+    def _rank(self, node: int) -> tuple[bool, bool, int]:
+        return bool(self.fixed[node]), bool(self.on_boundary[node]), len(self.around[node])
+
+    def merge(self, number: int, edge: Edge) -> bool:
+        """Makes one face of a face and its neighbour across an edge; see :meth:`collapse`."""
+        other = self.across(edge, number)
+        if other is None:
+            return False
+        ours, theirs = self.faces[number], self.faces[other]
+        i, j = ours.index(edge[1]), theirs.index(edge[0])
+        face = ours[i:] + ours[:i] + (theirs[j:] + theirs[:j])[1:-1]
+        if len(set(face)) != len(face):
+            return False
+        changed = {number: face, other: []}
+        if not self._allowed(changed):
+            return False
+        self.normals[number] = self.normals[number] + self.normals[other]
+        return self._apply(changed, None, False, None)
+
+    def drop_straight_nodes(self, number: int) -> None:
+        """Takes nodes out of a face that it has alone, apart from fixed ones."""
+        for node in list(self.faces[number]):
+            face = self.faces[number]
+            if len(face) > 3 and len(self.around[node]) == 1 and not self.fixed[node]:
+                without = [other for other in face if other != node]
+                if self.area_vector(without) @ self.normals[number] > 0:
+                    self.faces[number] = without
+                    del self.around[node]
+
+    def _allowed(self, changed: dict[int, list[int]]) -> bool:
+        faces = [face for face in changed.values() if face]
+        if not faces or len({frozenset(face) for face in faces}) != len(faces):
+            return False
+        nodes = {node for number in changed for node in self.faces[number]}
+        nodes = {node for node in nodes if any(node in face for face in faces) or self.around[node] - changed.keys()}
+        if not all(self._is_fan(node, changed) for node in nodes):
+            return False
+        return all(self._keeps_side(number, face) for number, face in changed.items() if face)
+
+    def _keeps_side(self, number: int, face: list[int]) -> bool:
+        normal = self.normals[number]
+        area = self.area_vector(face)
+        return float(area @ normal) > 0.2 * float(np.linalg.norm(area)) * float(np.linalg.norm(normal))
+
+    def _is_fan(self, node: int, changed: dict[int, list[int]]) -> bool:
+        """Whether the faces around a node are one fan, open or closed."""
+        after: dict[int, int] = {}
+        for number in self.around[node] | {n for n, face in changed.items() if node in face}:
+            face = changed.get(number, self.faces[number])
+            if node not in face:
+                continue
+            k = face.index(node)
+            if face[(k + 1) % len(face)] in after:
+                return False
+            after[face[(k + 1) % len(face)]] = face[k - 1]
+        starts = after.keys() - set(after.values())
+        if len(starts) > 1 or not after:
+            return False
+        at = first = next(iter(starts)) if starts else next(iter(after))
+        for step in range(1, len(after) + 1):
+            at = after[at]
+            if at == first or at not in after:
+                return step == len(after) and (at == first or bool(starts))
+        return False
+
+    def _apply(self, changed: dict[int, list[int]], gone: int | None, reaches: bool, stays: int | None) -> bool:
+        for number, face in changed.items():
+            for node in self.faces[number]:
+                self.around[node].discard(number)
+            if not face:
+                del self.faces[number]
+                continue
+            self.faces[number] = face
+            for node in face:
+                self.around[node].add(number)
+        if gone is not None and stays is not None:
+            del self.around[gone]
+            self.went[gone] = stays
+        if stays is not None and reaches:
+            self.on_boundary[stays] = True
+        return True

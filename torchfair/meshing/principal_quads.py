@@ -1,0 +1,75 @@
+"""Quad meshes whose edges follow principal curvature lines."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from ..topology import Topology
+from .components import mesh_components, read_surface, spacing_of
+from .lattice import SQUARES
+from .quad_mesh import QuadMesh
+from .report import measure
+from .settings import MeshingSettings
+from .verification import verified_topology
+
+
+def principal_quads(
+    vertices: Tensor,
+    topology: Topology,
+    *,
+    count: int | None = None,
+    spacing: float | None = None,
+    settings: MeshingSettings | None = None,
+) -> QuadMesh:
+    """A quad mesh of a surface whose edges follow its principal curvature lines.
+
+    Its vertices lie on the surface. Inside all faces are quads, which meet in fours but for the singular points of the
+    principal directions; at the boundary cells are clipped to polygons. Euler number, boundary loops, components and
+    orientation are those of the surface. Components are meshed one by one with the same spacing.
+
+    Quads along principal directions are nearly planar, and have the least E of all: that of edges across an absolute
+    curvature is its integral, so that E is the total absolute curvature C (section 4 of the paper).
+
+    Args:
+        vertices: (V, 3) positions of the surface, any length unit.
+        topology: its connectivity; polygons are cut into triangles.
+        count: how many faces, about.
+        spacing: length of edges, in place of a count.
+        settings: :class:`MeshingSettings`, by default those.
+
+    Returns:
+        The mesh. Its report has ``angle_mean_degrees`` and ``angle_95_degrees`` between inner edges and principal
+        directions (None where there are none), ``planarity_mean`` and ``planarity_max``
+        (:func:`torchfair.geometry.planarity`), ``normal_variation`` (E), ``total_absolute_curvature`` (C, of the
+        surface) and their ratio ``variation_over_curvature`` (None for flat surfaces), ``distance_max`` of the middles
+        of edges and faces from the surface in mean edges, ``singular`` points by index, ``total_index``, and sizes.
+
+    Raises:
+        ShapeError: if ``vertices`` is not one mesh that fits.
+        SettingsError: if neither or both of count and spacing are given, or one is out of range.
+        MeshError: if the surface has no faces, or faces without area; :class:`NoMeshError` if no valid mesh was
+            found, with the place.
+
+    Example:
+        >>> from torchfair.shapes import Torus, irregular_triangles
+        >>> surface = irregular_triangles(Torus(), 800)
+        >>> mesh = principal_quads(surface.vertices, surface.topology, count=300)
+        >>> mesh.topology.is_quadrangular, mesh.report["singular"]
+        (True, {})
+    """
+    chosen = settings or MeshingSettings()
+    surface = read_surface(vertices, topology, chosen)
+    size = spacing_of(surface, SQUARES.cell, count, spacing)
+    pieces = mesh_components(surface, [SQUARES] * len(surface.parts), size, chosen)
+    faces, positions = pieces.faces, torch.from_numpy(pieces.positions)
+    made = verified_topology(faces, len(positions), surface.shape)
+    report = measure(positions, made, surface, size, pieces.indices)
+    return QuadMesh(
+        positions.to(vertices),
+        made.to(vertices.device),
+        pieces.places.to(vertices),
+        pieces.indices.to(vertices),
+        report,
+        [*surface.notes, *pieces.notes],
+    )

@@ -1,0 +1,157 @@
+"""A map to the plane whose lines of whole numbers follow the field and fit together over the cuts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+import torch
+
+from ..fields.frames import FaceFrames, Floats, Ints
+from ..fields.matchings import QUARTER
+from ..linear import Factor, RslabDirect, factorise
+from .closest_vectors import closest_vectors
+from .cut_graph import CutGraph
+from .integers import IntegerSplit
+from .seams import ROTATIONS, Seams
+
+_TRIED = 16  # whole vectors, until no triangle is turned over
+_THIN = 0.05  # of the area wanted, below which triangles are counted as nearly turned over
+
+
+@dataclass(frozen=True, eq=False)
+class SeamlessMap:
+    """Coordinates of a mesh in which the lines of whole numbers are the lines of the new mesh.
+
+    Attributes:
+        frames, graph, seams: the mesh, cut open.
+        values: (N,) complex coordinates of copies; whole at singular vertices.
+        areas: (F,) of the triangles in the plane, over those wanted; negative where turned over.
+    """
+
+    frames: FaceFrames
+    graph: CutGraph
+    seams: Seams
+    values: np.ndarray
+    areas: Floats
+
+    @property
+    def flips(self) -> Ints:
+        """Numbers of the triangles that are turned over or have no area."""
+        return np.flatnonzero(self.areas <= 1e-9)
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the map is one to one near every point."""
+        return not len(self.flips) and not len(self.branches)
+
+    @cached_property
+    def branches(self) -> Ints:
+        """Numbers of the inner vertices around which the plane is not covered as often as their index says."""
+        around = self.values[self.seams.copies]
+        ahead = np.roll(around, -1, axis=1) - around
+        angles = np.angle(-np.roll(ahead, 1, axis=1) * ahead.conj())
+        total = np.bincount(self.frames.triangles.ravel(), angles.ravel(), len(self.frames.points))
+        off = np.abs(total / QUARTER - (4 - self.graph.charges)) > 0.5
+        return np.flatnonzero(off & ~self.frames.is_boundary & (self.frames.topology.valences.numpy() > 0))
+
+    @cached_property
+    def translations(self) -> np.ndarray:
+        """(I,) complex whole translations over the cut edges, 0 elsewhere."""
+        copies, (f, g), (i, j) = self.seams.copies, self.frames.faces.T, self.frames.corners.T
+        turn = np.array(ROTATIONS)[self.graph.quarters]
+        steps = self.values[copies[g, (j + 1) % 3]] - turn * self.values[copies[f, i]]
+        return np.where(self.graph.cut, np.rint(steps.real) + 1j * np.rint(steps.imag), 0)
+
+
+@dataclass(frozen=True, eq=False)
+class MapProblem:
+    """Least squares for the gradients of a seamless map, factorised once.
+
+    Attributes:
+        frames, graph, seams, split: the mesh, cut open, and its unknowns.
+        shear: (2, 2) from whole coordinates to those whose gradients follow the field.
+        density: (F, 2) gradients wanted along and across the field, one over lengths.
+        anisotropy: (F,) weight of the wrong direction of gradients over that of their lengths.
+    """
+
+    frames: FaceFrames
+    graph: CutGraph
+    seams: Seams
+    split: IntegerSplit
+    shear: Floats
+    density: Floats
+    anisotropy: Floats
+
+    def candidates(self) -> list[SeamlessMap]:
+        """Maps with whole numbers near the real optimum, the best first: less turned over, then nearer.
+
+        There is one only if it has nothing turned over.
+        """
+        rows, right = self._rows()
+        free = (rows @ self.split.free).tocsc()
+        whole = np.asarray((rows @ self.split.whole) @ self.split.basis)
+        right = right - rows @ self.split.fixed
+        factor = factorise((free.T @ free).tocsr(), solver="rslab" if RslabDirect.available() else "scipy")
+        best = _solve(factor, free.T @ right)
+        base = self.split.free @ best + self.split.fixed
+        if not whole.shape[1]:
+            return [self.map_of(base)]
+        mixed = free.T @ whole
+        answers = _solve(factor, mixed)
+        metric = whole.T @ whole - mixed.T @ answers
+        metric = (metric + metric.T) / 2
+        scale = np.linalg.eigvalsh(metric)[-1]
+        target = np.linalg.lstsq(metric + 1e-13 * scale * np.eye(len(metric)), whole.T @ right - mixed.T @ best)[0]
+        moves = np.asarray(self.split.whole @ self.split.basis - self.split.free @ answers)
+        found = []
+        for vector in closest_vectors(metric / scale, target).vectors[:_TRIED]:
+            found.append(self.map_of(base + moves @ vector))
+            if found[-1].is_sound:
+                return [found[-1]]
+        return sorted(found, key=badness)
+
+    def map_of(self, parts: Floats) -> SeamlessMap:
+        """The map whose copies have real and imaginary parts (2N,) in turn."""
+        values = parts[::2] + 1j * parts[1::2]
+        at_singular = self.graph.singular[self.seams.vertex]
+        values[at_singular] = np.rint(values[at_singular].real) + 1j * np.rint(values[at_singular].imag)
+        return SeamlessMap(self.frames, self.graph, self.seams, values, self.relative_areas(values))
+
+    def relative_areas(self, values: np.ndarray) -> Floats:
+        """(F,) signed areas of triangles in the plane over those wanted."""
+        a, b, c = values[self.seams.copies].T
+        doubled = ((b - a).conj() * (c - a)).imag * np.linalg.det(self.shear)
+        return np.asarray(doubled / (2 * self.frames.areas * self.density.prod(1)))
+
+    def _rows(self) -> tuple[sp.csr_matrix, Floats]:
+        """Four rows for every face: gradients along and across the field, of both coordinates."""
+        count = len(self.density)
+        turned = self.frames.gradients * np.exp(-1j * self.graph.angles)[:, None]
+        size = np.sqrt(self.frames.areas / self.density.prod(1))[:, None]
+        face, corner = np.repeat(np.arange(count), 3), self.seams.copies.ravel()
+        entries, right = [], np.zeros((4, count))
+        for coordinate in (0, 1):
+            along, across = (turned.real, turned.imag) if coordinate == 0 else (turned.imag, turned.real)
+            right[2 * coordinate] = size[:, 0] * self.density[:, coordinate]
+            for row, part in (
+                (2 * coordinate, along),
+                (2 * coordinate + 1, np.sqrt(self.anisotropy)[:, None] * across),
+            ):
+                for k in np.flatnonzero(self.shear[coordinate]):
+                    values = (part * size * self.shear[coordinate, k]).ravel()
+                    entries.append((row * count + face, 2 * corner + k, values))
+        rows, columns, numbers = (np.concatenate(part) for part in zip(*entries, strict=True))
+        shape = (4 * count, 2 * len(self.seams.vertex))
+        return sp.csr_matrix((numbers, (rows, columns)), shape=shape), right.ravel()
+
+
+def badness(found: SeamlessMap) -> tuple[int, float]:
+    """How far a map is from one to one near every point: triangles turned over and branches, then thin ones."""
+    return len(found.flips) + len(found.branches), float(np.maximum(_THIN - found.areas, 0).sum())
+
+
+def _solve(factor: Factor, right: Floats) -> Floats:
+    return np.asarray(factor.solve(torch.from_numpy(np.ascontiguousarray(right))).values.numpy())

@@ -1,0 +1,61 @@
+"""Settings of principal meshing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from .._numbers import check_count, check_number
+from ..errors import SettingsError
+from ..settings import setting
+
+_NOISY = 3  # rings
+
+
+@dataclass(frozen=True)
+class MeshingSettings:
+    """What :func:`principal_quads` and :func:`principal_triangles` take for a surface. One setting serves all.
+
+    Attributes:
+        smoothing: Length over which directions are smoothed, in edge lengths of the new mesh; ``"auto"`` takes a
+            quarter, and one where there is noise.
+        noise: Over how many rings of vertices curvature is averaged; ``"auto"`` finds it.
+        merging: Singular vertices that are closer than this are merged, in edge lengths of the new mesh.
+        align_boundary: Whether parts of the boundary that nearly follow a direction become lines of the mesh.
+        boundary_angle: How far they may turn from the direction, radians.
+        corner_angle: Boundary vertices that turn by more are corners and stay, radians.
+        fallback: Whether other settings are tried where these give no valid mesh; what was taken is said.
+        time_limit: No other settings are tried after so many seconds.
+
+    Raises:
+        SettingsError: a setting is out of its range; names it.
+    """
+
+    smoothing: float | Literal["auto"] = "auto"
+    noise: int | Literal["auto"] = "auto"
+    merging: float = 1.0
+    align_boundary: bool = True
+    boundary_angle: float = setting(math.radians(12.0), unit="radians")
+    corner_angle: float = setting(math.radians(40.0), unit="radians")
+    fallback: bool = True
+    time_limit: float = setting(45.0, unit="seconds")
+
+    def __post_init__(self) -> None:
+        if self.smoothing != "auto":
+            check_number("smoothing (or 'auto')", self.smoothing, above=True, finite=True)
+        if self.noise != "auto":
+            check_count("noise (or 'auto')", self.noise, least=0)
+        check_number("merging", self.merging, finite=True)
+        for name in ("align_boundary", "fallback"):
+            if not isinstance(getattr(self, name), bool):
+                raise SettingsError(f"{name} must be True or False, got {getattr(self, name)!r}")
+        check_number("boundary_angle", self.boundary_angle, most=math.pi / 4)
+        check_number("corner_angle", self.corner_angle, above=True, most=math.pi)
+        check_number("time_limit", self.time_limit)
+
+    def smoothing_length(self, rings: int) -> float:
+        """Over how many edge lengths directions are smoothed, where curvature is averaged over so many rings."""
+        if self.smoothing == "auto":
+            return 0.25 if rings < _NOISY else 1.0
+        return float(self.smoothing)

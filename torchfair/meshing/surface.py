@@ -1,0 +1,121 @@
+"""The surface that is meshed: its components, as triangles with principal directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from .._half_edges import first_few
+from .._one_mesh import one_mesh
+from ..errors import MeshError
+from ..fields import Directions, FaceFrames, carried_directions, directions_of
+from ..geometry import degenerate_faces
+from ..subdivision import midpoint
+from ..topology import Topology
+from ..triangulation import triangulate
+
+_RINGS = (1, 2, 3, 5, 7, 10)
+_SMOOTH = 0.005  # radians between directions of neighbouring triangles that are not looked into
+_GAIN = 1.2  # by which they fall where there is noise
+_COARSE = 1.0  # mean edge over the spacing above which triangles are cut
+_MOST_FACES = 40_000  # that are made by cutting
+
+
+@dataclass(frozen=True, eq=False)
+class DesignSurface:
+    """One connected component of triangles.
+
+    Attributes:
+        vertices: (V, 3) float64, on the CPU.
+        topology: triangles.
+        numbers: (V,) of the vertices in the mesh that was given.
+    """
+
+    vertices: Tensor
+    topology: Topology
+    numbers: Tensor
+
+    @cached_property
+    def frames(self) -> FaceFrames:
+        """Of the triangles."""
+        return FaceFrames.of(self.vertices, self.topology)
+
+    def directions(self, rings: int | Literal["auto"]) -> tuple[Directions, int]:
+        """Principal directions by so many rings, and their number.
+
+        Noise is what averaging takes away; the turning of directions along the surface it leaves. So ``"auto"`` takes
+        more rings as long as neighbouring triangles then agree much better.
+        """
+        if rings != "auto":
+            return directions_of(self.vertices, self.topology, self.frames, rings), rings
+        best = directions_of(self.vertices, self.topology, self.frames, _RINGS[0])
+        rough, number = _roughness(self.frames, best), _RINGS[0]
+        for more in _RINGS[1:]:
+            if rough <= _SMOOTH:
+                break
+            wider = directions_of(self.vertices, self.topology, self.frames, more)
+            then = _roughness(self.frames, wider)
+            if rough < _GAIN * then:
+                break
+            best, rough, number = wider, then, more
+        return best, number
+
+    def cut_finer(self, directions: Directions, spacing: float) -> tuple[DesignSurface, Directions]:
+        """Triangles fine enough for edges of a length, on the same flat pieces."""
+        surface = self
+        while surface.frames.lengths.mean() > _COARSE * spacing and 4 * surface.topology.num_faces <= _MOST_FACES:
+            finer = midpoint(surface.topology)
+            new = torch.full((finer.topology.num_vertices - surface.topology.num_vertices,), -1)
+            cut = DesignSurface(finer.apply(surface.vertices), finer.topology, torch.cat([surface.numbers, new]))
+            parents = finer.face_parents.numpy()
+            directions = carried_directions(directions, surface.frames, cut.frames, parents)
+            surface = cut
+        return surface, directions
+
+
+def _roughness(frames: FaceFrames, directions: Directions) -> float:
+    """Median angle between principal directions across edges, over those that are sure."""
+    f, g = frames.faces.T
+    turned = directions.values[g] * (directions.values[f] * np.exp(2j * frames.turns)).conj()
+    sure = np.minimum(directions.confidence[f], directions.confidence[g]) > 0.2
+    if not sure.any():
+        return 0.0
+    quarter = np.angle(turned[sure] ** 2) / 4  # up to quarter turns, so that curvatures may change places
+    return float(np.median(np.abs(quarter)))
+
+
+def components_of(vertices: Tensor, topology: Topology) -> list[DesignSurface]:
+    """The components of a mesh, triangulated.
+
+    Raises:
+        ShapeError: if it is not one mesh.
+        MeshError: if there is no face, a coordinate is not finite, or a face has no area.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    points, topology = one_mesh(vertices, topology).cpu().double(), topology.to("cpu")
+    if not topology.num_faces:
+        raise MeshError("the surface has no faces. Give a mesh with at least one face.")
+    if not points.isfinite().all():
+        wrong = torch.nonzero(~points.isfinite().all(1)).squeeze(1).tolist()
+        raise MeshError(f"vertices: not finite numbers: {first_few(wrong, len(wrong))}")
+    flat = torch.nonzero(degenerate_faces(points, topology)).squeeze(1).tolist()
+    if flat:
+        raise MeshError(f"{len(flat)} face(s) have no area: faces {first_few(flat, len(flat))}. Remove or remesh them.")
+    triangles = triangulate(points, topology).triangles
+    whole = Topology.from_faces(triangles, topology.num_vertices)
+    f, g = whole.interior_edge_faces.numpy().T
+    count = whole.num_faces
+    labels = connected_components(coo_array((np.ones(len(f)), (f, g)), shape=(count, count)), directed=False)[1]
+    parts = []
+    for label in range(labels.max() + 1):
+        chosen = triangles[torch.from_numpy(labels == label)]
+        numbers, corners = torch.unique(chosen, return_inverse=True)
+        parts.append(DesignSurface(points[numbers], Topology.from_faces(corners, len(numbers)), numbers))
+    return parts

@@ -1,0 +1,52 @@
+"""Whether a mesh has the topology of the surface that it was made from."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+
+from ..errors import MeshError
+from ..topology import Topology
+
+
+class Shape(NamedTuple):
+    """What does not change when a surface is meshed anew."""
+
+    euler_number: int
+    boundary_loops: int
+    components: int
+
+
+def shape_of(topology: Topology) -> Shape:
+    """Euler number, number of boundary loops and of components; isolated vertices are not counted."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    used = int((topology.valences > 0).sum())
+    v, w = topology.edges.cpu().numpy().T
+    size = topology.num_vertices
+    graph = coo_array((torch.ones(len(v)).numpy(), (v, w)), shape=(size, size))
+    components = connected_components(graph, directed=False)[0] - (size - used)
+    euler_number = used - topology.num_edges + topology.num_faces
+    return Shape(euler_number, topology.loop_offsets.shape[0] - 1, int(components))
+
+
+def verified_topology(faces: list[list[int]], num_vertices: int, wanted: Shape) -> Topology:
+    """The topology of faces that are an oriented manifold of the shape wanted.
+
+    Raises:
+        MeshError: if they are none, with what is wrong.
+    """
+    if not faces:
+        raise MeshError("no face is left")
+    topology = Topology.from_faces(faces, num_vertices)
+    found = shape_of(topology)
+    wrong = [
+        f"{name.replace('_', ' ')} {getattr(found, name)} instead of {getattr(wanted, name)}"
+        for name in Shape._fields
+        if getattr(found, name) != getattr(wanted, name)
+    ]
+    if wrong:
+        raise MeshError("the mesh would have " + ", ".join(wrong))
+    return topology
