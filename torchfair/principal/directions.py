@@ -212,7 +212,8 @@ def _means(values: Floats, weights: Floats, components: Ints, count: int) -> Flo
     weights = np.where(np.isnan(values), 0.0, weights)
     sums = np.bincount(components, np.nan_to_num(values) * weights, count)
     totals = np.bincount(components, weights, count)
-    return np.divide(sums, totals, out=np.full(count, np.inf), where=totals > 0)
+    means: Floats = np.divide(sums, totals, out=np.full(count, np.inf), where=totals > 0)
+    return means
 
 
 def _mean(values: Floats, weights: Floats) -> float:
