@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import MeshError, MeshFileError
+from ..errors import MeshError
 from .arguments import count
+from .edge_marks import labels_beside
 from .errors import CommandError
 
 if TYPE_CHECKING:
@@ -118,26 +118,6 @@ def joined_edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
     if number < 0:
         raise CommandError(f"--seed: vertices {ends[0]} and {ends[1]} are not joined by an edge")
     return number
-
-
-def labels_beside(name: str) -> Path | None:
-    """The file that marks edges of INPUT, if there is one."""
-    from ..io import edge_labels_path
-
-    if name.startswith("example:"):
-        return None
-    path = edge_labels_path(name)
-    if path.suffix.lower() == ".obj":
-        return path if _has_lines(path) else None
-    return path if path.exists() else None
-
-
-def _has_lines(path: Path) -> bool:
-    try:
-        with path.open("rb") as file:
-            return any(line.lstrip().startswith((b"l ", b"l\t")) for line in file)
-    except OSError as error:
-        raise MeshFileError(path, str(error.strerror or error)) from None
 
 
 def _exceptions(edges: PrincipalEdges) -> list[str]:
