@@ -12,7 +12,10 @@ from interruptions import nth, press
 
 from torchfair.cli import main
 from torchfair.energies import normal_variation
-from torchfair.io import load_mesh, save_mesh
+from torchfair.io import edge_labels_path, load_edge_labels, load_mesh, save_mesh
+from torchfair.principal import principal_edges_of_lattice
+from torchfair.shapes import Catenoid, principal_triangles
+from torchfair.subdivision import loop
 
 QUIET = ["--iterations", "3", "--no-pictures"]
 
@@ -198,3 +201,39 @@ def test_the_printed_method_is_found_again_by_its_report(roof: Path, tmp_path: P
     again = ["--settings", str(first.parent / "report.json"), "--no-pictures"]
     assert main(["fair", str(roof), "-o", str(second), *again]) in (0, 1)
     assert second.read_bytes() == first.read_bytes()
+
+
+@pytest.mark.parametrize("levels", [0, 1])
+@pytest.mark.parametrize("ending", [".obj", ".ply"])
+def test_marked_edges_go_with_the_mesh(ending: str, levels: int, tmp_path: Path) -> None:
+    mesh = principal_triangles(Catenoid(), 5, 8)
+    edges = principal_edges_of_lattice(mesh)
+    save_mesh(tmp_path / "lattice.obj", mesh.vertices, mesh.topology, polylines=edges.polylines())
+    output = tmp_path / "out" / f"fair{ending}"
+    words = [str(tmp_path / "lattice.obj"), "-o", str(output), "--levels", str(levels), *QUIET]
+    main(["fair", *words])
+    made = load_mesh(output)
+    marks = load_edge_labels(edge_labels_path(output), made.topology)
+    expected = edges.refine(loop(mesh.topology)).mask if levels else edges.mask
+    assert torch.equal(marks, expected)
+    assert int(expected.sum()) > 0
+
+
+def test_marks_of_single_edges_stay_single_and_bad_ones_are_refused_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    vertices, topology = wavy_grid(7, 6)
+    line = topology.edges[:1]
+    save_mesh(tmp_path / "quads.obj", vertices, topology, polylines=list(line))
+    output = tmp_path / "fair.obj"
+    main(["fair", str(tmp_path / "quads.obj"), "-o", str(output), "--levels", "1", *QUIET])
+    made = load_mesh(output)
+    marks = load_edge_labels(output, made.topology)
+    assert int(marks.sum()) == 2
+    assert set(line.flatten().tolist()) <= set(made.topology.edges[marks].flatten().tolist())
+    capsys.readouterr()
+    text = (tmp_path / "quads.obj").read_text()
+    (tmp_path / "bad.obj").write_text(text + "l 1 40\n")
+    assert main(["fair", str(tmp_path / "bad.obj"), "-o", str(tmp_path / "bad" / "out.obj"), *QUIET]) == 2
+    assert "not joined by an edge" in error_line(capsys)
+    assert not (tmp_path / "bad").exists()

@@ -12,8 +12,13 @@ from geometry_meshes import mixed_grid
 from torchfair.cli import main
 from torchfair.formfinding.symmetric.measures import condition_residuals
 from torchfair.io import load_edge_labels, load_mesh, save_edge_labels, save_mesh
-from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
-from torchfair.shapes import Catenoid, Paraboloid, Torus, principal_quads, principal_triangles
+from torchfair.principal import (
+    PrincipalEdges,
+    misalignment_of,
+    principal_edges_from_seed,
+    principal_edges_of_lattice,
+)
+from torchfair.shapes import Catenoid, Paraboloid, Torus, icosphere, principal_quads, principal_triangles
 from torchfair.shapes.principal_triangles import parameter_triangles
 
 
@@ -73,7 +78,9 @@ def test_labels_come_from_the_input_from_a_file_from_a_seed_or_from_directions(
         labels = load_edge_labels(output.with_suffix(".edges.json"), mesh.topology)
         assert torch.equal(labels, edges.mask), words
     out, _ = capsys.readouterr()
-    assert "follow principal directions" in out
+    assert "the family that follows principal directions best, 0.00 radians off" in out
+    assert f"parallel to ({v}, {w}), 0.00 radians off" in out
+    assert "WARNING" not in out
     assert f"those of {marked}" in out
 
 
@@ -121,7 +128,7 @@ def test_exceptions_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     save_edge_labels(tmp_path / "holes.json", mesh.topology, mask)
     words = [str(tmp_path / "saddle.obj"), "--labels", str(tmp_path / "holes.json"), "-o", str(tmp_path / "x.obj")]
     assert main(["symmetric", *words, "--no-pictures"]) == 2
-    assert "principal edges" in error_line(capsys)
+    assert "go without conditions there with --allow-exceptions" in error_line(capsys)
     assert main(["symmetric", *words, "--no-pictures", "--allow-exceptions"]) == 0
     assert "do not fit" in capsys.readouterr().out
 
@@ -156,3 +163,28 @@ def test_marks_in_both_families_of_quads_are_refused(tmp_path: Path, capsys: pyt
     save_mesh(tmp_path / "quads.obj", mesh.vertices, mesh.topology, polylines=lines)
     assert main(["symmetric", str(tmp_path / "quads.obj"), "-o", str(tmp_path / "out.obj"), "--no-pictures"]) == 2
     assert "marks edges of both families" in error_line(capsys)
+
+
+def test_options_in_messages_are_those_of_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = icosphere(2)
+    save_mesh(tmp_path / "sphere.obj", mesh.vertices, mesh.topology)
+    words = [str(tmp_path / "sphere.obj"), "-o", str(tmp_path / "x.obj")]
+    assert main(["symmetric", *words]) == 2
+    error = error_line(capsys)
+    assert "Pass --allow-exceptions to" in error
+    assert "allow_exceptions" not in error
+
+
+def test_a_family_across_the_directions_is_warned_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = parameter_triangles(Catenoid(), 8, 12, along="u")
+    seed = next(
+        (v, w)
+        for number, (v, w) in enumerate(mesh.topology.edges.tolist())
+        if misalignment_of(mesh.vertices, principal_edges_from_seed(mesh.topology, number)) > 0.5
+    )
+    save_mesh(tmp_path / "mesh.obj", mesh.vertices, mesh.topology)
+    words = [str(tmp_path / "mesh.obj"), "-o", str(tmp_path / "x.obj"), "--no-pictures", "--steps", "2"]
+    main(["symmetric", *words, "--seed", *map(str, seed)])
+    out = capsys.readouterr().out
+    assert "WARNING: edges at random are 0.39 off" in out
+    assert "--seed V W" in out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import pytest
 import torch
@@ -11,7 +12,13 @@ from principal_lattices import LATTICES, cone, relabelled
 
 from torchfair import MeshError, ShapeError, Topology, TorchfairError
 from torchfair._graph import edge_numbers
-from torchfair.principal import principal_edges_from_directions
+from torchfair.geometry import principal_directions
+from torchfair.principal import (
+    PrincipalEdges,
+    misalignment_of,
+    principal_edges_from_directions,
+    principal_edges_from_seed,
+)
 from torchfair.shapes import Catenoid, Cylinder, PrincipalHelicoid, Torus, icosphere, principal_triangles
 from torchfair.subdivision import loop
 
@@ -89,6 +96,103 @@ def test_edges_along_circles_of_latitude_are_aligned_by_symmetry() -> None:
     assert principal_edges_from_directions(mesh.vertices, mesh.topology).misalignment < 1e-9
 
 
+def families(topology: Topology) -> list[PrincipalEdges]:
+    """All three, from the sides of one inner face."""
+    inside = ~topology.is_boundary_vertex[topology.triangles].any(1)
+    face = int(inside.nonzero()[0])
+    return [principal_edges_from_seed(topology, topology.corner_edges[3 * face + side]) for side in range(3)]
+
+
+def mean_angle_to_the_cross(vertices: torch.Tensor, edges: PrincipalEdges) -> float:
+    """Edge by edge, at inner vertices only: the angle to the nearer direction."""
+    directions, angles = principal_directions(vertices, edges.topology), []
+    for v, w in edges.topology.edges[edges.mask].tolist():
+        for end in (v, w):
+            if not edges.topology.is_boundary_vertex[end]:
+                x, y = (directions[end] @ (vertices[w] - vertices[v])).abs().tolist()
+                angles.append(min(math.atan2(y, x), math.atan2(x, y)))
+    return sum(angles) / len(angles)
+
+
+def lattice_over(height: Callable[..., torch.Tensor], degrees: float) -> tuple[torch.Tensor, Topology]:
+    """A lattice of equilateral triangles, turned, over a hexagon of width 2."""
+    vertices, topology = flat_cone(6, 10)
+    turn, (x, y, _) = math.radians(degrees), vertices.T
+    x, y = math.cos(turn) * x - math.sin(turn) * y, math.sin(turn) * x + math.cos(turn) * y
+    x, y = x / 10, y / 10
+    return torch.stack([x, y, height(x, y)], dim=1), topology
+
+
+HEIGHTS = {
+    "hills and valleys": lambda x, y: 0.25 * torch.sin(3 * x) * torch.cos(3 * y),
+    "waves": lambda x, y: 0.2 * torch.sin(4 * x) + 0.12 * torch.sin(4 * y),
+    "dome": lambda x, y: -0.3 * x * x - 0.1 * y * y,
+    "saddle": lambda x, y: 0.3 * x * x - 0.3 * y * y,
+}
+
+
+@pytest.mark.parametrize("degrees", [10, 45, 70])
+@pytest.mark.parametrize("shape", HEIGHTS)
+def test_the_family_nearest_to_the_cross_is_taken(shape: str, degrees: float) -> None:
+    """Between hills and valleys d1 and d2 change places: each alone is pi/4 off every family."""
+    vertices, topology = lattice_over(HEIGHTS[shape], degrees)
+    naive = [mean_angle_to_the_cross(vertices, family) for family in families(topology)]
+    found = principal_edges_from_directions(vertices, topology)
+    assert mean_angle_to_the_cross(vertices, found.edges) == pytest.approx(min(naive))
+    assert found.misalignment == pytest.approx(misalignment_of(vertices, found.edges), abs=1e-12)
+    for family, angle in zip(families(topology), naive, strict=True):  # the same but for confidence and averaging
+        assert misalignment_of(vertices, family) == pytest.approx(angle, abs=0.15)
+
+
+def test_the_other_families_of_principal_lattices_are_far_off() -> None:
+    for name, (mesh, along) in LATTICES.items():
+        values = sorted(misalignment_of(mesh.vertices, family) for family in families(mesh.topology))
+        right = PrincipalEdges(mesh.topology, mesh.edges_along(along))
+        assert values[0] == pytest.approx(misalignment_of(mesh.vertices, right), abs=1e-12), name
+        assert values[0] < 0.02, name
+        assert values[1] > 0.2, name
+
+
+def test_the_order_of_both_directions_does_not_matter_at_any_vertex() -> None:
+    mesh, _ = LATTICES["Catenoid u zigzag"]
+    directions = torch.as_tensor(mesh.principal_directions)
+    swapped = torch.where((torch.arange(len(directions)) % 3 == 0)[:, None, None], directions.flip(1), directions)
+    signs = 1.0 - 2.0 * (torch.arange(2 * len(directions)).reshape(-1, 2, 1) % 5 == 0)
+    first, second = (
+        principal_edges_from_directions(mesh.vertices, mesh.topology, d) for d in (directions, signs * swapped)
+    )
+    assert torch.equal(first.edges.mask, second.edges.mask)
+    assert first.misalignment == pytest.approx(second.misalignment, abs=1e-12)
+
+
+def test_directions_count_by_their_confidence() -> None:
+    """Half of the directions are wrong by 60 degrees: with them alone another family follows them."""
+    vertices, topology = flat_cone(6, 4)
+    one = torch.tensor([1.0, 0.0, 0.0]).double().expand_as(vertices)
+    other = torch.tensor([0.5, 0.75**0.5, 0.0]).double().expand_as(vertices)
+    left = vertices[:, 0] < 0.0
+    directions = torch.where(left[:, None], one, other)
+    for trusted, along in ((left, one), (~left, other)):
+        found = principal_edges_from_directions(vertices, topology, directions, confidence=trusted.double())
+        edges = (vertices[topology.edges[:, 1]] - vertices[topology.edges[:, 0]])[found.edges.mask]
+        assert torch.linalg.cross(edges, along[: len(edges)].expand_as(edges)).abs().max() < 1e-7
+        assert found.misalignment < 1e-7
+        scaled = principal_edges_from_directions(vertices, topology, directions, confidence=7.0 * trusted.double())
+        assert scaled.misalignment == pytest.approx(found.misalignment, abs=1e-9)
+    none = misalignment_of(vertices, found.edges, directions, confidence=torch.zeros(len(vertices)))
+    assert none == 0.0
+
+
+def test_spheres_and_flat_stars_do_not_count() -> None:
+    vertices, topology = flat_cone(6, 6)
+    assert principal_edges_from_directions(vertices, topology).misalignment == 0.0
+    x = vertices[:, 0]
+    bent = torch.stack([x, vertices[:, 1], 0.1 * x.clamp_min(0.0) ** 3], dim=1)
+    assert principal_edges_from_directions(bent, topology).misalignment < 0.05
+    mesh = icosphere(2)
+    assert principal_edges_from_directions(mesh.vertices, mesh.topology, allow_exceptions=True).misalignment == 0.0
+
+
 def test_each_component_chooses_for_itself() -> None:
     meshes = [principal_triangles(Catenoid(), 6, 10, along=along) for along in ("u", "v")]
     offset = meshes[0].topology.num_vertices
@@ -162,6 +266,10 @@ def test_bad_input() -> None:
         principal_edges_from_directions(vertices, topology, bad)
     with pytest.raises(TorchfairError, match="vertices: some are not finite"):
         principal_edges_from_directions(bad, topology)
+    with pytest.raises(ShapeError, match="confidence: expected"):
+        principal_edges_from_directions(vertices, topology, confidence=torch.ones(3))
+    with pytest.raises(TorchfairError, match="confidence: some are negative"):
+        principal_edges_from_directions(vertices, topology, confidence=-torch.ones(len(vertices)))
     nothing = Topology.from_faces([], num_vertices=2)
     found = principal_edges_from_directions(torch.zeros(2, 3), nothing)
     assert found.misalignment == 0

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from .edge_marks import MarkedOutputs, read_marks
 from .inputs import add_handles, add_levels, add_reference, add_repair, read_handles, read_input, read_reference
 from .job_command import JobCommand
 from .outputs import Request, Writer
@@ -66,6 +67,10 @@ class FairCommand(JobCommand):
         add_handles(parser)
         add_repair(parser)
 
+    def outputs(self, arguments: argparse.Namespace) -> MarkedOutputs:
+        """See the base class."""
+        return MarkedOutputs(arguments, self.pictures)
+
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""
         options = {
@@ -73,7 +78,9 @@ class FairCommand(JobCommand):
             "handles": read_handles(arguments),
             "levels": arguments.levels,
         }
-        return Request(read_input(arguments.input, arguments.repair), options)
+        mesh = read_input(arguments.input, arguments.repair)
+        marks, notes = read_marks(mesh, arguments.input)
+        return Request(mesh, options, notes=notes, marks=marks)
 
 
 COMMAND = FairCommand()

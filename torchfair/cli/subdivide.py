@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .arguments import non_negative, positive_count
+from .edge_marks import carried, labels_beside
 from .errors import CommandError
 from .inputs import add_repair, read_input
 from .outputs import refuse_existing, refuse_unknown_format
-from .symmetric_inputs import labels_beside
 
 if TYPE_CHECKING:
     from torch import Tensor
 
     from ..io import PolygonMesh
-    from ..subdivision import Refinement
 
 NAME = "torchfair subdivide"
 _DESCRIPTION = (
@@ -76,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     output.parent.mkdir(parents=True, exist_ok=True)
     fine = None
     if marks is not None:
-        fine, note = _carried(arguments.lines, mesh, marks, step)
+        fine, note = carried(arguments.lines, marks, step)
         notes.append(note)
         lines = polylines_along(step.topology, fine) if in_mesh else []
     vertices = step.apply(mesh.vertices)
@@ -101,21 +100,3 @@ def _marks(arguments: argparse.Namespace, mesh: PolygonMesh) -> Tensor | None:
     if mesh.repairs:
         raise CommandError("--repair: marks of edges are for the vertex numbers of the file; write it repaired first")
     return load_edge_labels(file, mesh.topology)
-
-
-def _carried(lines: str, mesh: PolygonMesh, marks: Tensor, step: Refinement) -> tuple[Tensor, str]:
-    """Marks of the finer mesh, and what was decided, in words."""
-    parallel = lines == "parallel" or (lines == "auto" and _are_principal(mesh, marks))
-    fine = step.carry_edge_labels(marks, parallel=parallel)
-    words = "parts of marked edges and edges parallel to them" if parallel else "parts of marked edges"
-    return fine, f"{int(marks.sum())} marked edges to {int(fine.sum())}: {words}"
-
-
-def _are_principal(mesh: PolygonMesh, marks: Tensor) -> bool:
-    """Whether two opposite edges are marked at every regular vertex of a triangle mesh."""
-    from ..principal import PrincipalEdges
-
-    if not mesh.topology.is_triangular:
-        return False
-    edges = PrincipalEdges(mesh.topology, marks)
-    return bool(edges.stars().vertices.numel()) and not edges.exceptions.numel()

@@ -29,7 +29,16 @@ LABELS = {
     "largest_tilt_degrees": "largest angle to a prescribed tangent plane, degrees",
     "largest_cospherical": "largest residual of spheres, relative",
     "largest_coplanar": "largest residual of normals, relative",
-    "negative_stars": "saddle stars",
+    "largest_displacement": "largest displacement of a vertex",
+    "mean_displacement": "... mean",
+    "largest_distance_from_start": "largest distance from the surface at the start, mean edges",
+    "changed_stars": "stars of another kind than at the start",
+    "convex_stars": "convex stars",
+    "good_saddles": "good saddles",
+    "bad_saddles": "bad saddles",
+    "neither_stars": "stars that are neither",
+    "crossing_pyramids": "crossing pyramids",
+    "negative_stars": "stars with an angle sum above 360 degrees",
     "saddle_side_share": "... with their sides right",
     "crossing_pyramids_negative": "... with a crossing pyramid",
     "largest_handle_distance": "largest distance of a handle from its target",
@@ -38,7 +47,7 @@ LABELS = {
 
 _ONLY_IN_REPORTS = {
     *("total_mean_curvature", "total_frobenius_curvature", "mean_edge_length", "mean_cospherical", "mean_coplanar"),
-    *("stars", "crossing_pyramids"),
+    "stars",
 }
 _IF_ANY = {name for name in LABELS if name.startswith("largest_")} - {"largest_area_ratio", "largest_distance"}
 _IN_PERCENT = ("normal_variation", "total_absolute_curvature", "angle_variation", "area")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import MeshFileError
+from ..errors import MeshError
 from .arguments import count
+from .edge_marks import labels_beside
 from .errors import CommandError
 
 if TYPE_CHECKING:
@@ -16,6 +16,14 @@ if TYPE_CHECKING:
 
     from ..io import PolygonMesh
     from ..principal import PrincipalEdges
+
+
+_OPTIONS = {
+    "allow_exceptions=True": "--allow-exceptions",
+    "seed_edge:": "--seed:",
+    "go without conditions there": "go without conditions there with --allow-exceptions",
+}
+"""What errors of the library call options, in words of the command line."""
 
 
 def add_labels(parser: argparse.ArgumentParser) -> None:
@@ -32,20 +40,47 @@ def add_labels(parser: argparse.ArgumentParser) -> None:
 
 def read_principal_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[PrincipalEdges, list[str]]:
     """Principal edges as asked for, and what was decided, in words."""
+    from ..principal import misalignment_of
+
+    try:
+        edges, origin = _chosen_edges(arguments, mesh)
+    except MeshError as error:
+        words = str(error)
+        for argument, option in _OPTIONS.items():
+            words = words.replace(argument, option)
+        raise CommandError(words) from None
+    return edges, [_alignment(origin, misalignment_of(mesh.vertices, edges)), *_exceptions(edges)]
+
+
+def _chosen_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[PrincipalEdges, str]:
+    """Principal edges, and where they come from."""
     from ..io import load_edge_labels
     from ..principal import PrincipalEdges, principal_edges_from_directions, principal_edges_from_seed
 
     topology, allow = mesh.topology, arguments.allow_exceptions
     if arguments.seed is not None:
+        v, w = arguments.seed
         edges = principal_edges_from_seed(topology, joined_edge(arguments.seed, mesh), allow_exceptions=allow)
-        return edges, _exceptions(edges)
+        return edges, f"principal edges are parallel to ({v}, {w})"
     file = arguments.labels or labels_beside(arguments.input)
     if file is not None:
         edges = PrincipalEdges(topology, load_edge_labels(file, topology))
-        return (edges if allow else edges.check()), [f"principal edges are those of {file}", *_exceptions(edges)]
+        return (edges if allow else edges.check()), f"principal edges are those of {file}"
     aligned = principal_edges_from_directions(mesh.vertices, topology, allow_exceptions=allow)
-    note = f"principal edges follow principal directions, {aligned.misalignment:.2g} radians off on average"
-    return aligned.edges, [note, *_exceptions(aligned.edges)]
+    return aligned.edges, "principal edges are the family that follows principal directions best"
+
+
+def _alignment(origin: str, misalignment: float) -> str:
+    """Where principal edges come from, how well they follow the surface, and what to do if they do not."""
+    from ..principal import LARGE_MISALIGNMENT
+
+    words = f"{origin}, {misalignment:.2f} radians off the nearer principal direction on average"
+    if misalignment <= LARGE_MISALIGNMENT:
+        return words
+    return (
+        f"{words}. WARNING: edges at random are 0.39 off; the surface will have to bend to fit such edges. Choose "
+        "another family by one of its edges, with --seed V W, or remesh the surface along its principal directions"
+    )
 
 
 def vertex_mask(option: str, chosen: Sequence[int], mesh: PolygonMesh) -> Tensor:
@@ -83,26 +118,6 @@ def joined_edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
     if number < 0:
         raise CommandError(f"--seed: vertices {ends[0]} and {ends[1]} are not joined by an edge")
     return number
-
-
-def labels_beside(name: str) -> Path | None:
-    """The file that marks edges of INPUT, if there is one."""
-    from ..io import edge_labels_path
-
-    if name.startswith("example:"):
-        return None
-    path = edge_labels_path(name)
-    if path.suffix.lower() == ".obj":
-        return path if _has_lines(path) else None
-    return path if path.exists() else None
-
-
-def _has_lines(path: Path) -> bool:
-    try:
-        with path.open("rb") as file:
-            return any(line.lstrip().startswith((b"l ", b"l\t")) for line in file)
-    except OSError as error:
-        raise MeshFileError(path, str(error.strerror or error)) from None
 
 
 def _exceptions(edges: PrincipalEdges) -> list[str]:

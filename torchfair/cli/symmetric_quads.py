@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from .errors import CommandError
-from .symmetric_inputs import joined_edge, labels_beside
+from .edge_marks import labels_beside
+from .symmetric_inputs import joined_edge
 
 if TYPE_CHECKING:
     from torch import Tensor

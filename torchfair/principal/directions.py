@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError, TorchfairError
-from ..geometry import principal_directions, star_normals
+from ..geometry import fitted_curvature, star_normals
 from ..geometry._ops import cross, dot
 from ..topology import Topology
 from ._families import Differences, Ints, differences, face_components, mark, seams, spread
@@ -19,18 +19,20 @@ from .principal_edges import PrincipalEdges
 
 Floats = npt.NDArray[np.float64]
 
+LARGE_MISALIGNMENT = 0.4
+"""Radians from which on edges cannot be said to follow directions: crosses at random are pi/8 = 0.39 off."""
+
+_LEAST = 1e-6  # confidence of computed directions: also on spheres and planes there is a choice
+
 
 class AlignedEdges(NamedTuple):
     """Principal edges, and how well they follow the directions that they were chosen by.
 
     Attributes:
         edges: the choice.
-        misalignment: mean angle in radians, 0 to pi/2, between a principal edge and the mean of the directions at its
-            ends, seen along the vertex normals. Near 0 on meshes that follow the directions. Where equilateral
-            triangles lie at a constant angle to two orthogonal directions, the best choice has 0.26 (15 degrees) or
-            less; where directions turn against the lattice or are noise, it tends to pi/4 = 0.79.
-        chosen: (F,) which of the directions, 0 or 1, the principal edge of each face follows; the same in each
-            component. With computed directions 0 is that of the larger principal curvature, with its sign.
+        misalignment: see :func:`misalignment_of`.
+        chosen: (F,) which of the directions, 0 or 1, the principal edge of each face is nearer to. With computed
+            directions 0 is that of the larger principal curvature, with its sign.
     """
 
     edges: PrincipalEdges
@@ -39,89 +41,165 @@ class AlignedEdges(NamedTuple):
 
 
 def principal_edges_from_directions(
-    vertices: Tensor, topology: Topology, directions: Tensor | None = None, *, allow_exceptions: bool = False
+    vertices: Tensor,
+    topology: Topology,
+    directions: Tensor | None = None,
+    *,
+    confidence: Tensor | None = None,
+    allow_exceptions: bool = False,
 ) -> AlignedEdges:
     """The family of edges that best follows principal directions.
 
-    In each component there are three families of parallel edges, as :func:`principal_edges_from_seed` finds them,
-    and one or two fields of directions; taken is the family with the smallest mean angle to a field.
+    In each component there are three families of parallel edges, as :func:`principal_edges_from_seed` finds them; taken
+    is the one with the smallest mean angle to the cross of both directions, that is, to the nearer one. Which of both
+    has the larger curvature is not asked: between a hill and a valley they change places.
 
     Args:
         vertices: (V, 3) positions, any length unit.
         topology: a triangle mesh.
-        directions: (V, 3) or, two to choose from, (V, 2, 3), of any length and sign; zero where there is no
-            direction. If left out, :func:`torchfair.geometry.principal_directions` at interior vertices.
+        directions: (V, 3) or, a cross, (V, 2, 3), of any length and sign; zero where there is no direction. If left
+            out, those of :func:`torchfair.geometry.fitted_curvature` at interior vertices.
+        confidence: (V,) how much the directions count, 0 or more. By default all count alike if they are given, and
+            computed ones by :attr:`torchfair.geometry.FittedCurvature.confidence`: in full where they are certain, next
+            to nothing at umbilics, in flat places and where noise hides them.
         allow_exceptions: whether the choice may break where no family is consistent; the seams then run where
             triangles follow the directions badly or beside each other prefer different families.
 
     Raises:
-        ShapeError: if vertices or directions have another shape.
+        ShapeError: if vertices, directions or confidence have another shape.
         MeshError: if a face is not a triangle; and, unless exceptions are allowed, if no choice is possible, as
             for :func:`principal_edges_from_seed`.
-        TorchfairError: if a number is not finite, or a component has no directions at all.
+        TorchfairError: if a number is not finite, a confidence is negative, or a component has no directions at all.
     """
     rule = differences(topology)
-    fields = _fields(vertices, topology, directions)
-    angles = _side_angles(vertices, topology, fields, rule)
+    crosses = _crosses(vertices, topology, directions, confidence)
+    angles, nearer = _side_angles(vertices, topology, crosses, rule)
+    trust = _face_means(crosses, topology)
     components, count = face_components(rule)
     roots = np.unique(components, return_index=True)[1]
     starts = np.zeros(count, np.int64)
-    sides = np.stack([spread(rule, roots, starts)] * len(angles))
-    broken = seams(rule, sides[0])
+    sides = spread(rule, roots, starts)
+    broken = seams(rule, sides)
     if broken.size:
         if not allow_exceptions:
             require_no_seams(topology, broken)
-        sides = np.stack([spread(rule, roots, starts, _crossing_costs(rule, of_field)) for of_field in angles])
-    options = (sides[:, None] + np.arange(3)[:, None]) % 3  # (fields, 3, F)
-    taken = np.take_along_axis(angles[:, None], options[..., None], 3)[..., 0]
-    options = options.reshape(3 * len(angles), len(components))
-    taken = taken.reshape(options.shape)
-    means = np.stack([_means(option, components, count) for option in taken])
+        sides = spread(rule, roots, starts, _crossing_costs(rule, angles))
+    options = (sides + np.arange(3)[:, None]) % 3  # (3, F)
+    taken = np.take_along_axis(angles[None], options[..., None], 2)[..., 0]
+    means = np.stack([_means(option, trust, components, count) for option in taken])
     _require_directions(topology, means, roots)
     best = means.argmin(0)[components]
     faces = np.arange(len(components))
-    final, used = options[best, faces], taken[best, faces]
+    final = options[best, faces]
     edges = PrincipalEdges(topology, torch.from_numpy(mark(rule, final)).to(topology.device))
-    misalignment = float(np.nanmean(used)) if used.size else 0.0
-    return AlignedEdges(edges, misalignment, torch.from_numpy(best // 3).to(topology.device))
+    chosen = torch.from_numpy(nearer[faces, final]).to(topology.device)
+    return AlignedEdges(edges, _mean(taken[best, faces], trust), chosen)
 
 
-def _fields(vertices: Tensor, topology: Topology, directions: Tensor | None) -> Tensor:
-    """(fields, V, 3)."""
+def misalignment_of(
+    vertices: Tensor,
+    edges: PrincipalEdges,
+    directions: Tensor | None = None,
+    *,
+    confidence: Tensor | None = None,
+) -> float:
+    """Mean angle in radians between principal edges and the nearer of both principal directions, 0 to pi/4.
+
+    Seen along the vertex normals, between a principal edge and the mean of the directions at its ends; 0 to pi/2 if a
+    single direction is given. Near 0 on meshes that follow the directions. Where equilateral triangles lie at a
+    constant angle to both directions, the best choice has 0.26 (15 degrees) or less; where directions turn against the
+    lattice or are noise, it tends to pi/8 = 0.39, and above :data:`LARGE_MISALIGNMENT` there is little that a choice of
+    edges can do.
+
+    Args:
+        vertices: (V, 3) positions, any length unit.
+        edges: the choice, with the topology.
+        directions: see :func:`principal_edges_from_directions`.
+        confidence: likewise.
+
+    Returns:
+        The mean over all faces with a principal edge, weighted by their confidence; 0 if no direction counts.
+
+    Raises:
+        ShapeError, TorchfairError: as :func:`principal_edges_from_directions`.
+    """
+    rule = differences(edges.topology)
+    crosses = _crosses(vertices, edges.topology, directions, confidence)
+    angles, _ = _side_angles(vertices, edges.topology, crosses, rule)
+    principal = edges.mask.cpu().numpy()[rule.side_edges]
+    trust = np.broadcast_to(_face_means(crosses, edges.topology)[:, None], angles.shape)
+    return _mean(angles[principal], trust[principal])
+
+
+class _Crosses(NamedTuple):
+    """Directions and how much they count.
+
+    Attributes:
+        directions: (V, fields, 3) float64, zero where there is none.
+        confidence: (V,) float64, zero where there is no direction.
+    """
+
+    directions: Tensor
+    confidence: Tensor
+
+
+def _crosses(vertices: Tensor, topology: Topology, directions: Tensor | None, confidence: Tensor | None) -> _Crosses:
     topology.check_vertices(vertices)
+    count = topology.num_vertices
     if vertices.ndim != 2:
-        raise ShapeError("vertices", f"one mesh ({topology.num_vertices}, 3)", tuple(vertices.shape))
+        raise ShapeError("vertices", f"one mesh ({count}, 3)", tuple(vertices.shape))
+    if directions is not None and directions.shape not in ((count, 3), (count, 2, 3)):
+        raise ShapeError("directions", f"({count}, 3) or ({count}, 2, 3)", tuple(directions.shape))
+    if confidence is not None and confidence.shape != (count,):
+        raise ShapeError("confidence", f"({count},)", tuple(confidence.shape))
+    for name, values in (("vertices", vertices), ("directions", directions), ("confidence", confidence)):
+        if values is not None and not values.isfinite().all():
+            raise TorchfairError(f"{name}: some are not finite numbers. Use zeros where there is no direction.")
+    if confidence is not None and (confidence < 0).any():
+        raise TorchfairError("confidence: some are negative. Use zeros where there is no direction.")
+    vertices = vertices.detach().to(torch.float64)
     if directions is None:
-        directions = principal_directions(vertices, topology).clone()
+        fitted = fitted_curvature(vertices, topology)
+        directions = fitted.directions.clone()
         directions[topology.is_boundary_vertex] = 0  # directions there are less certain
-    elif directions.shape not in ((topology.num_vertices, 3), (topology.num_vertices, 2, 3)):
-        expected = f"({topology.num_vertices}, 3) or ({topology.num_vertices}, 2, 3)"
-        raise ShapeError("directions", expected, tuple(directions.shape))
-    for name, values in (("vertices", vertices), ("directions", directions)):
-        if not values.isfinite().all():
-            raise TorchfairError(f"{name}: some are not finite numbers. Use zero vectors where there is no direction.")
-    return directions.reshape(topology.num_vertices, -1, 3).transpose(0, 1)
+        confidence = fitted.confidence.clamp_min(_LEAST) if confidence is None else confidence
+    directions = directions.detach().to(torch.float64).reshape(count, -1, 3)
+    exists = (directions != 0).any(2).any(1).to(torch.float64)
+    return _Crosses(directions, exists if confidence is None else exists * confidence.detach().to(torch.float64))
 
 
-def _side_angles(vertices: Tensor, topology: Topology, fields: Tensor, rule: Differences) -> Floats:
-    """(fields, F, 3) angle of each side with the mean of the directions at its ends, NaN where there is none."""
-    vertices, fields = vertices.detach().to(torch.float64), fields.detach().to(torch.float64)
-    ends = topology.edges
+def _side_angles(vertices: Tensor, topology: Topology, crosses: _Crosses, rule: Differences) -> tuple[Floats, Ints]:
+    """(F, 3) angle of each side with the nearer mean of directions at its ends, NaN where there is none; and which."""
+    directions, ends = crosses.directions.transpose(0, 1), topology.edges
+    vertices = vertices.detach().to(torch.float64)
     along = (vertices[ends[:, 1]] - vertices[ends[:, 0]])[:, None]
     normals = star_normals(vertices, topology)[ends]
-    at_ends = fields[:, ends]  # (fields, E, 2, 3)
+    at_ends = directions[:, ends]  # (fields, E, 2, 3)
     # Directions have no sign, so angles are doubled before they are averaged. On a curve that bends in the surface
     # the angles at both ends have opposite signs.
     flat = torch.complex(dot(at_ends, along), dot(cross(at_ends, along.expand_as(at_ends)), normals))
-    mean = torch.nan_to_num((flat / flat.abs()) ** 2).sum(-1)
+    doubled = torch.nan_to_num((flat / flat.abs()) ** 2) * crosses.confidence[ends]
+    first, second = doubled.unbind(2)  # (fields, E)
+    # Between the ends d1 and d2 may change places: each direction goes with the one that is nearest to it.
+    likeness = (first[:, None] * second[None].conj()).real + 1e-12 * torch.eye(len(first)).to(first.real)[..., None]
+    partner = likeness.argmax(1)
+    mean = first + second.gather(0, partner)
     angle = torch.where(mean.abs() > 1e-9, mean.angle().abs() / 2, torch.nan)
-    values: Floats = angle.cpu().numpy()
-    return values[:, rule.side_edges]
+    nearest, which = torch.where(angle.isnan(), torch.inf, angle).min(0)
+    values: Floats = torch.where(nearest.isinf(), torch.nan, nearest).cpu().numpy()
+    fields: Ints = which.cpu().numpy()
+    return values[rule.side_edges], fields[rule.side_edges]
+
+
+def _face_means(crosses: _Crosses, topology: Topology) -> Floats:
+    """(F,) mean confidence at the corners."""
+    means: Floats = crosses.confidence[topology.triangles].mean(1).cpu().numpy()
+    return means
 
 
 def _crossing_costs(rule: Differences, angles: Floats) -> Floats:
     """(I,) high where two faces prefer sides that are not parallel or do not follow the directions (F, 3)."""
-    filled = np.where(np.isnan(angles), np.pi / 2, angles)
+    filled = np.where(np.isnan(angles), np.pi / 4, angles)
     preferred, quality = filled.argmin(1), filled.min(1)
     left, right = rule.faces.T
     disagree = (preferred[left] + rule.shifts - preferred[right]) % 3 != 0
@@ -129,12 +207,20 @@ def _crossing_costs(rule: Differences, angles: Floats) -> Floats:
     return costs
 
 
-def _means(values: Floats, components: Ints, count: int) -> Floats:
-    """(count,) mean over each component of the values that are not NaN, infinite where there are none."""
-    known = ~np.isnan(values)
-    sums = np.bincount(components[known], values[known], count)
-    numbers = np.bincount(components[known], minlength=count)
-    return np.where(numbers > 0, sums / np.maximum(numbers, 1), np.inf)
+def _means(values: Floats, weights: Floats, components: Ints, count: int) -> Floats:
+    """(count,) weighted mean over each component of the values that are not NaN, infinite where there are none."""
+    weights = np.where(np.isnan(values), 0.0, weights)
+    sums = np.bincount(components, np.nan_to_num(values) * weights, count)
+    totals = np.bincount(components, weights, count)
+    means: Floats = np.divide(sums, totals, out=np.full(count, np.inf), where=totals > 0)
+    return means
+
+
+def _mean(values: Floats, weights: Floats) -> float:
+    """Weighted mean of the values that are not NaN; 0 where there are none, or none that count."""
+    weights = np.where(np.isnan(values), 0.0, weights)
+    total = weights.sum()
+    return float(np.nan_to_num(values) @ weights / total) if total > 2 * _LEAST * len(weights) else 0.0
 
 
 def _require_directions(topology: Topology, means: Floats, roots: Ints) -> None:

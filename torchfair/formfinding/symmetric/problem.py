@@ -21,9 +21,11 @@ from ...projection.layout import State
 from ..face_guard import FaceGuard
 from ..job.plan import Stage
 from ..job.pulls import Pulls
+from .kept_shape import KeptShape
 from .settings import SymmetricSettings
 
 _SAFE_ANGLE = 2.5  # smallest angles at which the barrier sets in
+_KEPT_ENERGY = 0.01  # weight of E over that of the shape that is kept: vertices slide to where E is low
 _KEPT_MARGIN = 0.1  # share of the margin of saddle sides that is kept where conditions are met exactly
 
 
@@ -51,6 +53,7 @@ class SymmetricProblem:
 
     Attributes:
         sides: What stars are to be; see :class:`~torchfair.constraints.saddle_sides.SaddleSides`.
+        steered: Whether a handle has ever asked for another shape; without, that of the base is kept.
     """
 
     def __init__(
@@ -67,15 +70,20 @@ class SymmetricProblem:
         self.topology, self.stays, self.pulls = principal.topology, stays, pulls
         self.edges = c.between_stars(self.topology.edges[principal.mask], stars)
         self.sides = SaddleSides(stars, margin=settings.saddle_margin)
-        self._reference = reference
+        self._reference, self.steered = reference, False
         self.forget()
         self._angles = corner_angles(base, self.topology)
         self._smallest_angle = min(settings.smallest_angle, 0.8 * float(self._angles.min()))
         self._keeps_faces = FaceGuard(self.topology, lambda state: state["vertices"])
 
     @property
+    def keeps_shape(self) -> bool:
+        """Whether the mesh is to stay close to where it starts: nothing asks, or may come to ask, for another shape."""
+        return not (self.settings.free or self.steered or self.pulls.everywhere or self._reference is not None)
+
+    @property
     def has_other_goals(self) -> bool:
-        """Whether more is asked for than conditions and handles: closeness or E."""
+        """Whether more is asked for than conditions and handles: closeness to another surface, or E."""
         return self._reference is not None or self.settings.energy_weight > 0.0
 
     def pull_fully(self) -> None:
@@ -83,13 +91,19 @@ class SymmetricProblem:
         self.pulls.aims, self.pulls.strength = self.pulls.targets.clone(), 1.0
 
     def snapshot(self) -> Callable[[], None]:
-        """A function that puts saddle sides back to what they are now."""
-        saved = _copied(vars(self.sides))
-        return lambda: vars(self.sides).update(_copied(saved))
+        """A function that puts back saddle sides, and whether the shape is kept, to what they are now."""
+        saved, steered = _copied(vars(self.sides)), self.steered
+
+        def restore() -> None:
+            vars(self.sides).update(_copied(saved))
+            self.steered = steered
+
+        return restore
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""
         self._planes = None if self._reference is None else c.TangentPlanes(self._reference)
+        self._shape: KeptShape | None = None
         self._kept: dict[tuple[object, SymmetricSettings], list[ElementTerm]] = {}
 
     # ---- stages ----------------------------------------------------------------------------------------
@@ -111,7 +125,12 @@ class SymmetricProblem:
 
     @property
     def _lifts_energy(self) -> bool:
-        return self.settings.formulation == "lifted" and self.settings.energy_weight > 0.0
+        return self.settings.formulation == "lifted" and self._energy_weight > 0.0
+
+    @property
+    def _energy_weight(self) -> float:
+        least = _KEPT_ENERGY * self.settings.shape_weight if self.keeps_shape else 0.0
+        return max(self.settings.energy_weight, least)
 
     def stage(self, state: State, aim: Aim, settings: ProjectionSettings) -> Stage:
         """A run of guided projection from ``state`` on.
@@ -124,7 +143,7 @@ class SymmetricProblem:
             name=name,
             blocks=state,
             terms=lambda: self.terms(aim),
-            version=(aim, self.settings),
+            version=(aim, self.settings, self.keeps_shape),
             settings=replace(settings, solver=self.settings.projection.solver),
             fixed={"vertices": self.stays | self.pulls.held},
             guard=self.admits,
@@ -143,7 +162,7 @@ class SymmetricProblem:
             return conditions
         if aim is Aim.EXACT:
             return [*conditions, *self._sides(share=_KEPT_MARGIN)]
-        others = [*self._energy(weight), *self._same("others", self._others)]
+        others = [*self._energy(weight), *self._same(("others", self.keeps_shape), self._others)]
         return [*conditions, *self._sides(ahead=aim is not Aim.SEARCH), *others]
 
     def _same(self, name: object, make: Callable[[], list[ElementTerm]]) -> list[ElementTerm]:
@@ -186,23 +205,24 @@ class SymmetricProblem:
         ]
 
     def _closeness(self) -> list[ElementTerm]:
+        if self.keeps_shape:
+            self._shape = self._shape or KeptShape(self.base, self.topology)
+            return self._shape.terms(weight=self.settings.shape_weight)
         if self._planes is None:
             return []
         every = torch.arange(self.topology.num_vertices)
         return c.closeness_terms(self._planes, every, weight=self.settings.closeness_weight)
 
     def _energy(self, constraint_weight: float) -> list[ElementTerm]:
-        settings = self.settings
-        if not settings.energy_weight:
+        settings, weight = self.settings, self._energy_weight
+        if not weight:
             return []
         if self._lifts_energy:
             planar = torch.ones(self.topology.num_faces, dtype=torch.bool)
             return c.lifted_normal_variation_terms(
-                self.base, self.topology, planar, weight=settings.energy_weight, constraint_weight=constraint_weight
+                self.base, self.topology, planar, weight=weight, constraint_weight=constraint_weight
             )
-        return c.normal_variation_terms(
-            self.topology, smoothing=settings.energy_smoothing, weight=settings.energy_weight
-        )
+        return c.normal_variation_terms(self.topology, smoothing=settings.energy_smoothing, weight=weight)
 
     def _quality(self) -> list[ElementTerm]:
         smallest = self._smallest_angle

@@ -16,6 +16,7 @@ from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ..job import JobResult, Level, OneStage, Plan, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference, surface_of
+from .changes import Changes
 from .measures import symmetric_measures
 from .plan import SettlingPlan, SymmetricPlan
 from .problem import Aim, SymmetricProblem
@@ -51,6 +52,7 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
         reference: Surface to stay close to: vertices and topology of a mesh, or a function that gives closest points
             and unit normals (:func:`torchfair.geometry.closest_on`).
         rounds: How often a shape is looked for at most; None for as often as the settings say.
+        changes: Compares meshes with the start.
     """
 
     name = "symmetric"
@@ -69,6 +71,7 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
         self.principal = principal.to("cpu")
         super().__init__(vertices, self.principal.topology, settings or SymmetricSettings())
         self.stars = _chosen(self.principal.stars(), on)
+        self.changes = Changes(self.given, self.topology)
         self.reference = reference
         self.rounds: int | None = None
         surface = None if reference is None else surface_of(normalised_reference(reference, self.unit))
@@ -81,6 +84,10 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
         """Takes other weights."""
         super().take_settings(settings)
         self.problem.settings = settings
+
+    def reconsider(self) -> None:
+        """Once a vertex is pulled, the shape is no longer that of the start, even where it is let go again."""
+        self.problem.steered |= bool(self.pulls.pulled.any())
 
     def check_pulls(self, vertices: Tensor, targets: Tensor) -> None:
         """Handles on fixed vertices are refused."""
@@ -146,15 +153,17 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
     # ---- what comes of it ------------------------------------------------------------------------------
 
     def measures(self, vertices: Tensor) -> dict[str, float]:
-        """See :func:`~torchfair.formfinding.symmetric_measures`."""
+        """See :func:`~torchfair.formfinding.symmetric_measures`; and what has changed since the start of the level."""
         handles = self.pulls.vertices
         targets = self.unit.invert(self.pulls.targets[handles])
-        return symmetric_measures(vertices, self.principal, self.stars, handles, targets)
+        measures = symmetric_measures(vertices, self.principal, self.stars, handles, targets)
+        return {**measures, **self.changes.measures(vertices)}
 
     def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
         """See ``symmetric_promises``."""
         has_handles = bool(self.pulls.pulled.any())
-        return symmetric_promises(self.settings, before, after, has_handles=has_handles)
+        keeps_shape = self.problem.keeps_shape
+        return symmetric_promises(self.settings, before, after, has_handles=has_handles, keeps_shape=keeps_shape)
 
     def normals(self, vertices: Tensor) -> Tensor:
         """(V, 3) unit normals n(v) of vertices (V, 3); see :func:`~torchfair.formfinding.strip_normals`."""
@@ -184,7 +193,7 @@ def principal_symmetric(
     settings: SymmetricSettings | None = None,
     callback: Callback | None = None,
 ) -> JobResult[SymmetricLevel]:
-    """Makes a triangle mesh principal-symmetric, close to where it starts and through its handles, and refines it.
+    """Makes a triangle mesh principal-symmetric, in its shape or through its handles, and refines it.
 
     At every regular vertex the four neighbours across non-principal edges lie on a sphere through the vertex, along
     principal edges the normals of these spheres and the edge are coplanar, and where the angle sum is above 2 pi the
@@ -192,6 +201,12 @@ def principal_symmetric(
     level (:attr:`~torchfair.formfinding.JobResult.promises`): conditions within ``settings.tolerance``; negatively
     curved stars saddle-shaped, without pyramids that intersect themselves; handles within 0.05 mean edges of their
     targets; no face turned over.
+
+    Without handles and reference the shape is kept, unless ``settings.free``: vertices stay close to the surface on
+    which the level starts, its boundary glides on smooth curves through it, corners stay. Promised is then, too, that
+    no vertex is farther than 0.1 mean edges from that surface, and that E/C grows by 1 % at most. Where the lattice is
+    turned against principal directions, edges have to turn, and neither may be possible: see
+    :func:`torchfair.principal.misalignment_of`.
 
     Principal edges must run along a principal direction of the surface, and near parabolic curves along that of the
     smaller curvature: stars there cannot be saddle-shaped otherwise.

@@ -39,6 +39,7 @@ def refined(recipe: SymmetricRecipe, vertices: Tensor) -> SymmetricRecipe:
         settings=recipe.settings,
     )
     finer.pull(recipe.handles)
+    finer.problem.steered = recipe.problem.steered
     finer.pulls.hold(torch.nonzero(_carried(step, pulls.held, along)).squeeze(1))
     return finer
 

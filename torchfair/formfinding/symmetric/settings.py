@@ -45,6 +45,11 @@ class SymmetricSettings:
             the inverse fourth root of its quotient with ``fairness_weight`` in edges.
         handle_weight: Weight of half the squared distance of handles from their targets.
         closeness_weight: Weight of half the squared distance from the reference surface, if there is one.
+        free: Whether the shape may become another where no handle asks for it. Without handles and reference it is
+            kept otherwise: vertices stay close to the surface they start on, those of the boundary to curves. Live
+            sessions are free in any case.
+        shape_weight: Weight of half the squared distance from the shape that is kept. E counts at least a hundredth
+            of that then, which keeps stars that slide fair.
         energy_weight: Weight of E, which counts once; 0 without.
         energy_smoothing: ``l l*`` below this is treated as flat.
         saddle_weight: Weight of half the squares by which saddle sides are missed.
@@ -69,6 +74,8 @@ class SymmetricSettings:
     anchor_weight: float = 1e-5
     handle_weight: float = 1e2
     closeness_weight: float = 1.0
+    free: bool = False
+    shape_weight: float = 10.0
     energy_weight: float = 0.0
     energy_smoothing: float = 1e-2
     saddle_weight: float = 1.0
@@ -114,6 +121,7 @@ class SymmetricSettings:
             anchor_weight=0.0,
             handle_weight=w_handle,
             closeness_weight=w_prox,
+            free=True,
             energy_weight=0.5 * w_target,
             saddle_weight=0.0,
             smallest_angle=0.0,
