@@ -235,6 +235,16 @@ def test_what_is_not_kept_is_said() -> None:
     assert any("largest relative residual" in str(promise) for promise in result.promises if not promise.holds)
 
 
+def test_a_mesh_that_shrinks_to_a_point_is_returned_and_its_promises_fail() -> None:
+    """Nothing holds a closed mesh against fairness of weight 1."""
+    cube = torch.tensor([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=DOUBLE)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    triangles = [half for a, b, c, d in quads for half in ([a, b, c], [a, c, d])]
+    result = minimise_normal_variation(cube, Topology.from_faces(triangles), settings=FairSettings.paper())
+    assert result.after["mean_edge_length"] < 1e-6
+    assert not result.holds
+
+
 def test_a_report_gives_the_settings_back() -> None:
     sheet = wavy_grid(7, 6, triangles=True)
     settings = FairSettings.paper(w_fair=0.2, w_target=0.1, steps=3)

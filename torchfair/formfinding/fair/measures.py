@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from torch import Tensor
 
 from ...energies import angle_variation, normal_variation, total_absolute_curvature, total_mean_curvature
-from ...geometry import corner_angles, face_areas, face_normals
+from ...geometry import corner_angles, edge_lengths, face_areas, face_normals
 from ...geometry.closest_point import ReferenceSurface
 from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
@@ -54,7 +54,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "total_absolute_curvature": curvature,
         "energy_over_curvature": energy / curvature if curvature > 0.0 else math.nan,
         "area": float(face_areas(vertices, topology).sum()),
-        "mean_edge_length": float(Normalisation.of(vertices, topology).length),
+        "mean_edge_length": float(edge_lengths(vertices, topology).mean()),  # zero where all shrinks to a point
         "largest_distance": unit.length * float(distances.max()),
         "largest_distance_relative": float(distances.max()) / problem.input_edge,
         "largest_distance_back": unit.length * float(back.max()),

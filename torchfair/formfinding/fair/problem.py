@@ -286,15 +286,15 @@ class FairProblem:
         return [term, *c.distance_limit_terms(self._surface_or_curve, self.allowed, weight=settings.quality_weight)]
 
     def _limits(self) -> Tensor | None:
-        """(V,) largest distances from the reference that are allowed."""
-        limit = self.distance_limit
+        """(V,) largest distances from the reference that are allowed; isolated vertices have none, wherever they are."""
+        limit, used = self.distance_limit, self.topology.valences > 0
         if limit is None:
             return None
         distances = self.distances(self.vertices)
-        far = int((distances > limit)[self.topology.valences > 0].sum())
+        far = int((distances > limit)[used].sum())
         if far:
             self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")
-        return distances.clamp_min(limit) * _ROUNDING
+        return torch.where(used, distances.clamp_min(limit) * _ROUNDING, _NO_LIMIT)
 
     def _surface(self, state: State) -> tuple[Tensor, Tensor]:
         """Closest points on the surface and normals there; where it is given up, nothing that costs."""
