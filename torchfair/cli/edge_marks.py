@@ -107,10 +107,10 @@ class MarkedOutputs(Outputs):
         """Marked edges, unless they stand in a file beside."""
         from ..polylines import polylines_along
 
-        nowhere = self._marks is None or not self._in_mesh
-        return () if nowhere else polylines_along(result.topology, self._marks)
+        return polylines_along(result.topology, self._marks) if self._marks is not None and self._in_mesh else ()
 
     def _save(self, path: Path, request: Request, result: Any, overwrite: bool) -> None:
         from ..io import save_edge_labels
 
-        save_edge_labels(path, result.topology, self._marks, overwrite=overwrite)
+        if self._marks is not None:
+            save_edge_labels(path, result.topology, self._marks, overwrite=overwrite)

@@ -6,8 +6,8 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from .errors import CommandError
 from .edge_marks import labels_beside
+from .errors import CommandError
 from .symmetric_inputs import joined_edge
 
 if TYPE_CHECKING:
