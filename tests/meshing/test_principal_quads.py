@@ -178,6 +178,16 @@ def test_noise_is_averaged_away(noise: float) -> None:
     assert "rings" in found.notes[0]
 
 
+@pytest.mark.parametrize("count", [150, 500])
+def test_the_count_is_about_that_asked_for(count: int) -> None:
+    """On this surface lines diverge: with the spacing of the count there are a fifth fewer faces."""
+    vertices, topology = irregular(FreeFormPatch(), 2000)
+    found = principal_quads(vertices, topology, count=count)
+    assert abs(found.report["faces"] / count - 1) < 0.15
+    same = principal_quads(vertices, topology, spacing=found.report["spacing"])
+    assert same.report["faces"] == found.report["faces"]
+
+
 def test_types_come_back() -> None:
     vertices, topology = irregular(SADDLE)
     found = principal_quads(vertices.float(), topology, count=100)

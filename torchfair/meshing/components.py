@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,11 +16,14 @@ from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
 from ..topology import Topology
-from .ladder import mesh_component
+from .ladder import NoMeshError, mesh_component
 from .lattice import Lattice
 from .settings import MeshingSettings
 from .surface import DesignSurface, components_of
 from .verification import Shape, shape_of
+
+_CORRECTIONS = 2
+_COUNT_TOLERANCE = 0.08
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +143,46 @@ def mesh_components(surface: ReadSurface, lattices: list[Lattice], spacing: floa
         offset += len(mesh.positions)
     at = torch.from_numpy(np.concatenate(places))
     return Pieces(np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes)
+
+
+def mesh_to_count(
+    surface: ReadSurface,
+    lattices: list[Lattice],
+    spacing: float,
+    settings: MeshingSettings,
+    count: int | None,
+    faces_of: Callable[[Pieces], int],
+) -> tuple[Pieces, float]:
+    """Meshes with a spacing, then with others until the count is about that asked for; and the last spacing.
+
+    Directions that turn make lines diverge, so that cells are larger or smaller than the spacing says.
+
+    Args:
+        surface: with its directions.
+        lattices: of the components.
+        spacing: to start with.
+        settings: of the meshes.
+        count: None where the spacing is what was asked for.
+        faces_of: how many faces pieces have.
+
+    Raises:
+        NoMeshError: if the first spacing gives no valid mesh.
+    """
+    best = mesh_components(surface, lattices, spacing, settings)
+    for _ in range(_CORRECTIONS if count is not None else 0):
+        assert count is not None
+        ratio = faces_of(best) / count
+        if abs(ratio - 1) <= _COUNT_TOLERANCE:
+            break
+        other = spacing * math.sqrt(ratio)
+        try:
+            again = mesh_components(surface, lattices, other, settings)
+        except NoMeshError:
+            break
+        if abs(faces_of(again) / count - 1) >= abs(ratio - 1) or len(again.notes) > len(best.notes):
+            break
+        best, spacing = again, other
+    return best, spacing
 
 
 def _name(number: int, count: int) -> str:

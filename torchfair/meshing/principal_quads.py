@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from ..topology import Topology
-from .components import mesh_components, read_surface, spacing_of
+from .components import mesh_to_count, read_surface, spacing_of
 from .lattice import SQUARES
 from .quad_mesh import QuadMesh
 from .report import measure
@@ -61,7 +61,8 @@ def principal_quads(
     chosen = settings or MeshingSettings()
     surface = read_surface(vertices, topology, chosen)
     size = spacing_of(surface, SQUARES.cell, count, spacing)
-    pieces = mesh_components(surface, [SQUARES] * len(surface.parts), size, chosen)
+    lattices = [SQUARES] * len(surface.parts)
+    pieces, size = mesh_to_count(surface, lattices, size, chosen, count, lambda made: len(made.faces))
     faces, positions = pieces.faces, torch.from_numpy(pieces.positions)
     made = verified_topology(faces, len(positions), surface.shape)
     report = measure(positions, made, surface, size, pieces.indices)

@@ -14,7 +14,7 @@ from ..fields import Directions
 from ..fields.frames import FaceFrames, Floats
 from ..principal import PrincipalEdges
 from ..topology import Topology
-from .components import mesh_components, read_surface, spacing_of
+from .components import Pieces, mesh_to_count, read_surface, spacing_of
 from .cut_cells import cut_cells
 from .lattice import triangle_lattice
 from .report import measure
@@ -73,7 +73,7 @@ def principal_triangles(
     size = spacing_of(surface, ratio / 2, count, spacing)
     across = _rows_across(surface.frames, surface.directions)
     turned = replace(surface, fields=[_turned(of) for of in surface.fields]) if across else surface
-    pieces = mesh_components(turned, lattices, size, chosen)
+    pieces, size = mesh_to_count(turned, lattices, size, chosen, count, _triangles)
     triangles = cut_cells(pieces.positions, pieces.faces, pieces.rows)
     positions = torch.from_numpy(pieces.positions)
     made = verified_topology(triangles, len(positions), surface.shape)
@@ -90,6 +90,10 @@ def principal_triangles(
         {**report, "row_distance": ratio},
         [*surface.notes, *pieces.notes],
     )
+
+
+def _triangles(pieces: Pieces) -> int:
+    return sum(len(face) - 2 for face in pieces.faces)
 
 
 def _curvatures(frames: FaceFrames, directions: Directions) -> tuple[Floats, Floats]:
