@@ -2,12 +2,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
+import torch
 from star_tools import random_arms, stars_of
 
 from torchfair.cli import main
-from torchfair.io import save_mesh
+from torchfair.geometry import edge_lengths
+from torchfair.io import load_mesh, save_mesh
+from torchfair.shapes import Catenoid, principal_triangles
 
 KEYS = ("convex", "saddle", "neither", "good_saddle", "self_intersecting_pyramids")
 CUBE_OBJ = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1)) + (
@@ -57,7 +61,7 @@ def test_pictures_and_report_are_written_once(
     folder = tmp_path / "out"
     command = ["diagnose", stars_file, "-o", str(folder), "--vertex", "0", "--vertex", "7"]
     assert main(command) == 0
-    names = {"diagnosis.json", "classes.png", "pyramids.png", "gauss_image.png"}
+    names = {"diagnosis.json", "classes.png", "pyramids.png", "gauss_image.png", "classes.ply"}
     assert {path.name for path in folder.iterdir()} == names
     capsys.readouterr()
     assert main(command) == 2
@@ -94,3 +98,34 @@ def test_wrong_vertices_are_refused(
     assert main(["diagnose", stars_file, *options]) == 2
     assert named in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_worst_vertices_are_explained(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A good lattice with one vertex slid away: it is where the file says, and what is proposed mends it."""
+    mesh = principal_triangles(Catenoid(), 8, 12, along="v")
+    vertices, vertex = mesh.vertices.clone(), 50
+    frame = mesh.principal_directions[vertex]
+    vertices[vertex] += 0.35 * (frame[0] + frame[1]) * edge_lengths(vertices, mesh.topology).mean()
+    save_mesh(tmp_path / "one.obj", vertices, mesh.topology)
+    assert main(["diagnose", str(tmp_path / "one.obj"), "--json"]) == 0
+    report = read_json(capsys.readouterr().out)
+    rows: Any = report["worst_vertices"]
+    row = next(row for row in rows if row["vertex"] == vertex)
+    assert row["number_in_file"] == vertex + 1
+    assert row["position"] == pytest.approx(vertices[vertex].tolist())
+    assert row["remedy"]["bad_after"] < row["remedy"]["bad_before"]
+    assert "few" in report["advice"][0]  # type: ignore[index]
+    assert main(["diagnose", str(tmp_path / "one.obj")]) == 0
+    out = capsys.readouterr().out
+    assert row["remedy"]["words"] in out
+    assert row["pattern_words"] in out
+    assert "{:.6g} {:.6g} {:.6g}".format(*row["position"]) in out
+
+
+def test_the_coloured_mesh_is_the_mesh(stars_file: str, tmp_path: Path) -> None:
+    assert main(["diagnose", stars_file, "-o", str(tmp_path / "out")]) == 0
+    given, made = load_mesh(stars_file), load_mesh(tmp_path / "out" / "classes.ply")
+    assert torch.equal(given.vertices, made.vertices)
+    assert given.topology.face_lists() == made.topology.face_lists()
+    head = (tmp_path / "out" / "classes.ply").read_bytes().split(b"end_header")[0]
+    assert all(f"property uchar {name}".encode() in head for name in ("red", "green", "blue"))

@@ -101,6 +101,8 @@ def test_refusals(torus: Path, capsys: pytest.CaptureFixture[str]) -> None:
         ([str(torus), *output, "--handle", "3", "a", "b", "c"], "--handle"),
         ([str(torus), *output, "--fix", "3", "--handle", "3", "0", "0", "0"], "fixed"),
         ([str(torus), *output, "--dxf"], "--strips"),
+        ([str(torus), *output, "--sheet-width", "300"], "--sheet-width: give the height of strips"),
+        ([str(torus), *output, "--strips", "0.2", "--millimetres", "100", "--sheet-height", "25"], "mm wide"),
         ([str(torus), *output, "--strips", "0"], "height"),
         ([str(torus), *output, "--strips", "1", "--millimetres", "0"], "--millimetres"),
         ([str(torus), "-o", str(torus.parent / "x.txt")], "cannot write"),
@@ -188,3 +190,14 @@ def test_a_family_across_the_directions_is_warned_of(tmp_path: Path, capsys: pyt
     out = capsys.readouterr().out
     assert "WARNING: edges at random are 0.39 off" in out
     assert "--seed V W" in out
+
+
+def test_strips_on_sheets_in_millimetres(torus: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = torus.parent / "design" / "made.obj"
+    sheet = ["--strips", "0.2", "--millimetres", "100", "--sheet-width", "700", "--sheet-height", "300", "--gap", "4"]
+    assert main(["symmetric", str(torus), "-o", str(output), "--no-pictures", *sheet]) == 0
+    out = capsys.readouterr().out
+    report = json.loads((output.parent / "report.json").read_text())["strips"]
+    assert report["sheets"] > 1
+    assert (report["sheet_width_millimetres"], report["sheet_height_millimetres"]) == pytest.approx((700.0, 300.0))
+    assert f"on {report['sheets']} sheets of 700 x 300 mm" in out

@@ -78,7 +78,7 @@ def test_svg_files_are_true_to_scale(tmp_path: Path, strips: DevelopableStrips, 
         assert torch.allclose(path_points(outline, height), scale * expected, atol=1e-8 * scale)
     scores = torch.stack([path_points(line, height) for line in groups["score"]])
     assert torch.allclose(scores, scale * inner_rulings(strips), atol=1e-8 * scale)
-    assert [word.text for word in groups["label"]] == [f"#{name}" for name in strips.names]
+    assert [str(word.text).removesuffix(" v") for word in groups["label"]] == [f"#{name}" for name in strips.names]
 
 
 def test_labels_stand_in_their_strips_and_run_along_them(tmp_path: Path, strips: DevelopableStrips) -> None:
@@ -95,7 +95,37 @@ def test_labels_stand_in_their_strips_and_run_along_them(tmp_path: Path, strips:
         along = (quad[1] - quad[0]).mean(0)
         angle = torch.tensor(-turn).deg2rad()  # y points down in the file
         direction = torch.stack([angle.cos(), angle.sin()]).double()
-        assert torch.dot(direction, along) / along.norm() == pytest.approx(1, abs=1e-6)
+        side = -1 if str(word.text).endswith(" v") else 1  # whether the normals point to the foot of the word
+        assert torch.dot(direction, along) / along.norm() == pytest.approx(side, abs=1e-6)
+        assert -90.0 - 1e-6 < -turn <= 90.0 + 1e-6  # upright
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0, 4000.0])
+def test_lines_follow_the_size_of_the_sheet(tmp_path: Path, strips: DevelopableStrips, scale: float) -> None:
+    path = tmp_path / "strips.svg"
+    save_strips_svg(path, strips, millimetres=scale)
+    root = ElementTree.parse(path).getroot()
+    widths = [float(group.attrib["stroke-width"]) for group in root.iter(f"{SVG}g") if "stroke" in group.attrib]
+    assert widths == pytest.approx([scale * max(strips.sheet) / 1500] * 2, rel=1e-3)
+
+
+def test_sheets_of_a_height_lie_above_each_other(tmp_path: Path) -> None:
+    mesh = principal_triangles(Enneper(), 5, 8)
+    lines = principal_edges_of_lattice(mesh).polylines()
+    strips = developable_strips(mesh.vertices, lines, mesh.normals, 0.3, gap=0.1, sheet_width=2.0, sheet_height=1.1)
+    assert strips.sheets > 1
+    assert strips.sheet == pytest.approx((2.0, 1.1 * strips.sheets))
+    for outline in strips.outlines():
+        low, high = outline[:, 1].min(), outline[:, 1].max()
+        number = (low / 1.1).floor()
+        assert low >= 1.1 * number + 0.1 - 1e-9
+        assert high <= 1.1 * (number + 1) - 0.1 + 1e-9
+    save_strips_svg(tmp_path / "strips.svg", strips, millimetres=10.0)
+    rims = list(ElementTree.parse(tmp_path / "strips.svg").getroot().iter(f"{SVG}rect"))
+    assert len(rims) == strips.sheets
+    assert [float(rim.attrib["height"]) for rim in rims] == pytest.approx([11.0] * strips.sheets)
+    with pytest.raises(TorchfairError, match="sheet_height: a strip needs"):
+        developable_strips(mesh.vertices, lines, mesh.normals, 0.3, gap=0.1, sheet_height=0.45)
 
 
 @pytest.mark.parametrize("scale", [1.0, 250.0])
@@ -115,7 +145,8 @@ def test_dxf_files_are_true_to_scale(tmp_path: Path, strips: DevelopableStrips, 
     lines = [[tuple(end)[:2] for end in (line.dxf.start, line.dxf.end)] for line in space.query('LINE[layer=="SCORE"]')]
     scores = torch.tensor(lines, dtype=torch.float64)
     assert torch.allclose(scores, scale * inner_rulings(strips), atol=1e-9 * scale)
-    assert [text.dxf.text for text in space.query('TEXT[layer=="LABEL"]')] == [f"#{name}" for name in strips.names]
+    words = [text.dxf.text.removesuffix(" v") for text in space.query('TEXT[layer=="LABEL"]')]
+    assert words == [f"#{name}" for name in strips.names]
 
 
 def test_dxf_without_its_package(tmp_path: Path, strips: DevelopableStrips, monkeypatch: pytest.MonkeyPatch) -> None:

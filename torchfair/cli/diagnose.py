@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 NAME = "torchfair diagnose"
 PICTURES = ("classes.png", "pyramids.png", "gauss_image.png")
+COLORED = "classes.ply"
 REPORT = "diagnosis.json"
 _DESCRIPTION = (
     "Says of every inner vertex of a polygon mesh whether its star is convex, a good saddle, a bad saddle or neither, "
@@ -67,14 +68,22 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Checks what can be checked first, then reads, judges, writes and prints."""
-    from ..measuring import diagnose_mesh
+    from ..measuring import diagnose_mesh, layout_advice
 
     files = _files(arguments)
     mesh = read_input(arguments.input, arguments.repair)
     _check_vertices(arguments.vertex, mesh)
     diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
     numbers, worst = diagnosis.counts(), diagnosis.worst_vertices(arguments.worst)
-    report = {**numbers, "file": arguments.input, "repairs": list(mesh.repairs), "worst_vertices": worst}
+    advice = layout_advice(mesh.vertices, mesh.topology, diagnosis)
+    _explain(worst, mesh, _first_number(arguments.input))
+    report = {
+        **numbers,
+        "file": arguments.input,
+        "repairs": list(mesh.repairs),
+        "worst_vertices": worst,
+        "advice": advice,
+    }
     if arguments.per_vertex:
         report["per_vertex"] = diagnosis.per_vertex()
     if files:
@@ -86,7 +95,9 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"repaired: {sentence}")
     print(f"{arguments.input}\n{format_counts(numbers)}")
     if worst:
-        print(format_vertices(worst))
+        print(format_vertices(worst, _first_number(arguments.input)))
+    if advice:
+        print("\n".join(["", "advice", *(f"  {sentence}" for sentence in advice)]))
     print("".join(f"wrote {path}\n" for path in files), end="")
     return 0
 
@@ -101,16 +112,19 @@ def write(
     atomic_write_text(files[0], to_json(report), overwrite=arguments.force)
     if len(files) == 1:
         return
+    from ..io import save_mesh
     from ..viewing.picture_gauss_image import picture_gauss_image
     from ..viewing.picture_pyramids import picture_pyramids
-    from ..viewing.picture_star_classes import picture_star_classes
+    from ..viewing.picture_star_classes import picture_star_classes, star_class_colors
 
     vertices, topology, classes, crossings = mesh.vertices, mesh.topology, diagnosis.classes, diagnosis.crossings
-    overview, pyramids, sphere = files[1:]
+    overview, pyramids, sphere, colored = files[1:]
     picture_star_classes(overview, vertices, classes, crossings, overwrite=arguments.force)
     chosen = arguments.vertex or _instructive(diagnosis, report["worst_vertices"])
     picture_pyramids(pyramids, vertices, classes, crossings, chosen, overwrite=arguments.force)
     picture_gauss_image(sphere, vertices, topology, crossings, overwrite=arguments.force)
+    colors = star_class_colors(classes)
+    save_mesh(colored, vertices, topology, overwrite=arguments.force, binary=True, colors=colors)
 
 
 def format_counts(numbers: dict[str, Any]) -> str:
@@ -127,25 +141,61 @@ def format_counts(numbers: dict[str, Any]) -> str:
     for title, key in _PATTERNS:
         shown = list(numbers[key].items())
         if shown:
-            more = f", {len(shown) - 8} other patterns" if len(shown) > 8 else ""
-            lines += ["", title, "  " + ", ".join(f"{name}: {n}" for name, n in shown[:8]) + more]
+            lines += ["", title]
+            lines += [f"  {n:>9}  {_words(name)} ({name})" for name, n in shown[:8]]
+            lines += [f"  {'':>9}  {len(shown) - 8} other patterns"] if len(shown) > 8 else []
     return "\n".join(lines)
 
 
-def format_vertices(worst: list[dict[str, Any]]) -> str:
-    """The worst vertices as a table."""
+def _words(name: str) -> str:
+    """The pattern of that name in words."""
+    from ..measuring import pattern_words
+
+    return pattern_words([int(run) for run in name.split(",") if run.isdigit()])
+
+
+def format_vertices(worst: list[dict[str, Any]], first_number: int = 0) -> str:
+    """The worst vertices as a table, and what each of them needs."""
     lines = [
         "",
-        "worst vertices (perimeter of the normal pyramid in degrees; edges above and below the plane at the normal)",
-        f"  {'vertex':>9} {'valence':>8} {'class':>12} {'crossings':>10} {'perimeter':>10}  edges",
+        "worst vertices (counted from 0, as for --vertex, and as in the file, from "
+        f"{first_number}; perimeter of the normal pyramid in degrees; edges above and below the plane at the normal)",
+        f"  {'vertex':>9} {'in file':>9} {'valence':>8} {'class':>12} {'crossings':>10} {'perimeter':>10}  "
+        f"{'x y z':<32}  edges",
     ]
     for row in worst:
-        edges = ",".join(map(str, row["ordinary_pattern"])) or "-"
+        place = "{:.6g} {:.6g} {:.6g}".format(*row["position"])
         lines.append(
-            f"  {row['vertex']:>9} {row['valence']:>8} {row['class']:>12} {row['self_intersections']:>10} "
-            f"{row['perimeter_degrees']:>10.4g}  {edges}"
+            f"  {row['vertex']:>9} {row['number_in_file']:>9} {row['valence']:>8} {row['class']:>12} "
+            f"{row['self_intersections']:>10} {row['perimeter_degrees']:>10.4g}  {place:<32}  {row['pattern_words']}"
         )
+        lines.append(f"  {'':>9} {_remedy_words(row['remedy'])}")
     return "\n".join(lines)
+
+
+def _remedy_words(remedy: dict[str, Any] | None) -> str:
+    if remedy is None:
+        return "no slide of it and no flip of an edge beside it leaves fewer bad stars: see the advice for the mesh"
+    return f"{remedy['words']}: bad stars here {remedy['bad_before']} -> {remedy['bad_after']}"
+
+
+def _first_number(name: str) -> int:
+    """From which number on the file counts its vertices."""
+    return int(Path(name).suffix.lower() == ".obj")
+
+
+def _explain(worst: list[dict[str, Any]], mesh: PolygonMesh, first_number: int) -> None:
+    """Adds to every vertex where it is, its number in the file, its pattern in words, and what it needs."""
+    from ..measuring import pattern_words, star_remedy
+
+    vertices = mesh.vertices.double()
+    for row in worst:
+        vertex = row["vertex"]
+        remedy = star_remedy(vertices, mesh.topology, vertex, first_number=first_number)
+        row["position"] = vertices[vertex].tolist()
+        row["number_in_file"] = vertex + first_number
+        row["pattern_words"] = pattern_words(row["ordinary_pattern"], row["valence"])
+        row["remedy"] = None if remedy is None else remedy.as_dict()
 
 
 def _files(arguments: argparse.Namespace) -> list[Path]:
@@ -154,7 +204,8 @@ def _files(arguments: argparse.Namespace) -> list[Path]:
         if arguments.vertex:
             raise CommandError("--vertex draws a picture and needs a folder for it: --output FOLDER")
         return []
-    files = [Path(arguments.output) / name for name in (REPORT, *(() if arguments.no_pictures else PICTURES))]
+    pictures = () if arguments.no_pictures else (*PICTURES, COLORED)
+    files = [Path(arguments.output) / name for name in (REPORT, *pictures)]
     refuse_existing(files, force=arguments.force)
     return files
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,11 @@ def add_strips(parser: argparse.ArgumentParser) -> None:
         "(default 0)")  # fmt: skip
     add("--millimetres", type=non_negative, default=1.0, metavar="MM", help="length of one unit of INPUT in flat "
         "drawings (default 1)")  # fmt: skip
+    add("--sheet-width", type=non_negative, metavar="MM", help="width of a sheet (default: the best of several)")
+    add("--sheet-height", type=non_negative, metavar="MM", help="height of a sheet, of which there are as many as it "
+        "takes, one above the other in one drawing (default: one sheet, as high as it has to be)")  # fmt: skip
+    add("--gap", type=non_negative, metavar="MM", help="distance between strips on a sheet and to its rim, such as the "
+        "thickness of the material (default: a quarter of the width of the strips)")  # fmt: skip
     add("--dxf", action="store_true", help="write strips.dxf too (needs the extra torchfair[dxf])")
 
 
@@ -42,15 +48,32 @@ class StripFiles:
     def __init__(self, arguments: argparse.Namespace) -> None:
         self._height, self._depth, self._millimetres = arguments.strips, arguments.depth, arguments.millimetres
         self._dxf = arguments.dxf
+        lengths = {"sheet_width": arguments.sheet_width, "sheet_height": arguments.sheet_height, "gap": arguments.gap}
+        given = [name for name, value in lengths.items() if value is not None]
         self._made: DevelopableStrips | None = None
         if arguments.dxf and self._height is None:
             raise CommandError("--dxf: give the height of strips by --strips")
+        if given and self._height is None:
+            raise CommandError(f"--{given[0].replace('_', '-')}: give the height of strips by --strips")
         if self._height is not None and not self._height + self._depth > 0.0:
             raise CommandError("--strips: a strip needs a height or a depth above 0")
         if not self._millimetres > 0.0:
             raise CommandError("--millimetres: expected a number above 0")
+        self._sheet = {name: None if value is None else value / self._millimetres for name, value in lengths.items()}
+        self._check_sheet(lengths)
         if arguments.dxf and importlib.util.find_spec("ezdxf") is None:
             raise CommandError("--dxf needs ezdxf: pip install 'torchfair[dxf]'; SVG files do without")
+
+    def _check_sheet(self, lengths: Mapping[str, float | None]) -> None:
+        """Refuses sheets on which no strip finds room, before anything is solved."""
+        width = ((self._height or 0.0) + self._depth) * self._millimetres
+        gap = width / 4 if lengths["gap"] is None else lengths["gap"]
+        for name in ("sheet_width", "sheet_height"):
+            most = lengths[name]
+            if most is not None and most < width + 2.0 * gap:
+                raise CommandError(
+                    f"--{name.replace('_', '-')}: strips are {width:.6g} mm wide, with gaps {width + 2.0 * gap:.6g}"
+                )
 
     def files(self, folder: Path) -> dict[Path, Writer]:
         """Writers by path; none if no strips were asked for."""
@@ -65,7 +88,9 @@ class StripFiles:
 
         if self._height is None:
             return {}
-        self._made = strips = developable_strips(vertices, polylines, normals, self._height, depth=self._depth)
+        self._made = strips = developable_strips(
+            vertices, polylines, normals, self._height, depth=self._depth, **self._sheet
+        )
         return {
             "strips": len(strips.names),
             "quads": strips.topology.num_faces,
@@ -73,7 +98,10 @@ class StripFiles:
             "mean_planarity": float(strips.planarity.mean()),
             "largest_isometry_error": float(strips.isometry_errors.max()),
             "sheet_width": strips.sheet[0],
-            "sheet_height": strips.sheet[1],
+            "sheet_height": strips.sheet[1] / strips.sheets,
+            "sheets": strips.sheets,
+            "sheet_width_millimetres": self._millimetres * strips.sheet[0],
+            "sheet_height_millimetres": self._millimetres * strips.sheet[1] / strips.sheets,
         }
 
     @property

@@ -131,7 +131,8 @@ class SymmetricOutputs(Outputs):
         if made:
             request.notes.append(
                 f"{made['strips']} strips: planar to {made['largest_planarity']:.2g} edges, unrolled with lengths true "
-                f"to {made['largest_isometry_error']:.2g}"
+                f"to {made['largest_isometry_error']:.2g}, on {made['sheets']} sheet{'s' * (made['sheets'] != 1)} of "
+                f"{made['sheet_width_millimetres']:.5g} x {made['sheet_height_millimetres']:.5g} mm"
             )
 
     def polylines(self, result: Any) -> Sequence[Tensor]:

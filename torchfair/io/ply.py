@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import MeshFileError
 from .ply_header import Element, Header, read_header
@@ -16,6 +17,10 @@ from .ply_rows import Column, read_binary_rows, read_text_rows
 from .raw_mesh import Ints, Origin, RawMesh, assemble
 from .text import check_text, split_words
 from .text_rows import face_lines, vertex_lines
+
+Bytes = npt.NDArray[np.uint8]
+
+_COLORS = ("red", "green", "blue")
 
 
 def read_ply(path: Path, data: bytes) -> RawMesh:
@@ -91,8 +96,8 @@ def _read_text(
     return columns, element_lines
 
 
-def write_ply(mesh: RawMesh, *, binary: bool = False) -> bytes:
-    """The bytes of a PLY file, as text or in little-endian binary."""
+def write_ply(mesh: RawMesh, *, binary: bool = False, colors: Bytes | None = None) -> bytes:
+    """The bytes of a PLY file, as text or in little-endian binary, with colours (V, 3) of vertices if there are any."""
     sizes = np.diff(mesh.offsets)
     count_type = "uchar" if sizes.max() < 256 else "int"
     header = [
@@ -100,6 +105,7 @@ def write_ply(mesh: RawMesh, *, binary: bool = False) -> bytes:
         f"format {'binary_little_endian' if binary else 'ascii'} 1.0",
         f"element vertex {len(mesh.points)}",
         *(f"property double {axis}" for axis in "xyz"),
+        *(f"property uchar {name}" for name in _COLORS if colors is not None),
         f"element face {len(sizes)}",
         f"property list {count_type} int vertex_indices",
         "end_header\n",
@@ -107,8 +113,17 @@ def write_ply(mesh: RawMesh, *, binary: bool = False) -> bytes:
     text = "\n".join(header)
     if binary:
         count_width = 1 if count_type == "uchar" else 4
-        return text.encode() + mesh.points.astype("<f8").tobytes() + _binary_faces(mesh, sizes, count_width)
-    return (text + vertex_lines(mesh.points) + face_lines(mesh, with_size=True)).encode()
+        return text.encode() + _binary_vertices(mesh, colors) + _binary_faces(mesh, sizes, count_width)
+    vertices = vertex_lines(mesh.points)
+    if colors is not None:
+        rows = zip(vertices.splitlines(), colors.tolist(), strict=True)
+        vertices = "".join(f"{row} {red} {green} {blue}\n" for row, (red, green, blue) in rows)
+    return (text + vertices + face_lines(mesh, with_size=True)).encode()
+
+
+def _binary_vertices(mesh: RawMesh, colors: Bytes | None) -> bytes:
+    points = mesh.points.astype("<f8").view(np.uint8).reshape(len(mesh.points), -1)
+    return points.tobytes() if colors is None else np.concatenate([points, colors], axis=1).tobytes()
 
 
 def _binary_faces(mesh: RawMesh, sizes: Ints, count_width: int) -> bytes:

@@ -17,7 +17,7 @@ from . import others
 from .atomic import atomic_write_bytes
 from .obj import write_obj
 from .off import write_off
-from .ply import write_ply
+from .ply import Bytes, write_ply
 from .raw_mesh import Ints, RawMesh
 
 
@@ -29,6 +29,7 @@ def save_mesh(
     overwrite: bool = False,
     binary: bool = False,
     polylines: Sequence[Tensor] = (),
+    colors: Tensor | None = None,
 ) -> None:
     """Writes a polygon mesh; the file appears whole or not at all.
 
@@ -45,9 +46,10 @@ def save_mesh(
         binary: whether to write PLY in (little-endian) binary.
         polylines: OBJ files only: vertex numbers, two or more each, that are written as line elements, such as from
             ``PrincipalEdges.polylines``; :func:`load_edge_labels` reads the edges back.
+        colors: PLY files only: (V, 3) red, green and blue of every vertex, 0 to 1.
 
     Raises:
-        ShapeError: if ``vertices`` is not ``(V, 3)``; a batch has to be written mesh by mesh.
+        ShapeError: if ``vertices`` or ``colors`` is not ``(V, 3)``; a batch has to be written mesh by mesh.
         MeshError: if a coordinate is not finite, there is no face, the format does not hold such faces, or a
             polyline has fewer than two vertices or one that does not exist.
         MeshFileError: if the extension is unknown or the file cannot be written.
@@ -61,13 +63,15 @@ def save_mesh(
         raise MeshFileError(path, "only PLY files have a binary form here. Leave out binary=True")
     if len(polylines) and suffix != ".obj":
         raise MeshFileError(path, "only OBJ files hold polylines. Use save_edge_labels beside files of other formats")
+    if colors is not None and suffix != ".ply":
+        raise MeshFileError(path, "only PLY files hold colours here. Leave out colors")
     mesh = _raw_mesh(vertices, topology)
     if suffix == ".obj":
         data = write_obj(mesh, [_line_points(line, topology) for line in polylines])
     elif suffix == ".off":
         data = write_off(mesh)
     elif suffix == ".ply":
-        data = write_ply(mesh, binary=binary)
+        data = write_ply(mesh, binary=binary, colors=None if colors is None else _bytes(colors, topology))
     else:
         data = others.write_other(mesh, suffix)
     atomic_write_bytes(path, data, overwrite=overwrite)
@@ -87,6 +91,13 @@ def _raw_mesh(vertices: Tensor, topology: Topology) -> RawMesh:
             "Nothing was written."
         )
     return RawMesh(points, topology.corners.cpu().numpy(), topology.face_offsets.cpu().numpy())
+
+
+def _bytes(colors: Tensor, topology: Topology) -> Bytes:
+    if colors.shape != (topology.num_vertices, 3):
+        raise ShapeError("colors", f"({topology.num_vertices}, 3)", tuple(colors.shape))
+    values: Bytes = (255.0 * colors.detach().to("cpu", torch.float64).clamp(0.0, 1.0)).round().to(torch.uint8).numpy()
+    return values
 
 
 def _line_points(line: Tensor, topology: Topology) -> Ints:

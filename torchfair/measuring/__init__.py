@@ -7,6 +7,10 @@ from .measurements import Quantity as Quantity
 from .measurements import count_components as count_components
 from .measurements import measure_mesh as measure_mesh
 from .measurements import worst_edges as worst_edges
+from .pattern_words import pattern_words as pattern_words
+from .remedies import Remedy as Remedy
+from .remedies import layout_advice as layout_advice
+from .remedies import star_remedy as star_remedy
 from .stationarity import Stationarity as Stationarity
 from .stationarity import measure_stationarity as measure_stationarity
 from .trust import curvature_doubts as curvature_doubts

@@ -35,46 +35,57 @@ class Layout(NamedTuple):
     Attributes:
         corners: (S, 2) where to move the lower left corner of each bounding box.
         width: of the sheet.
-        height: of the sheet.
+        height: of the sheet, or of all sheets above each other.
+        sheets: how many there are, of equal height.
     """
 
     corners: Floats
     width: float
     height: float
+    sheets: int = 1
 
 
-def shelves(boxes: Floats, gap: float, width: float | None) -> Layout:
+def shelves(boxes: Floats, gap: float, width: float | None, height: float | None = None) -> Layout:
     """Places boxes (S, 2) in rows, high ones first, each ``gap`` away from its neighbours and the rim.
 
     Without a width, the smallest of several sheets is taken that are not much longer than broad.
 
+    With a height there are as many sheets as it takes, one above the other.
+
     Raises:
-        TorchfairError: if a box is broader than the sheet.
+        TorchfairError: if a box is broader or higher than the sheet.
     """
     if not len(boxes):
         return Layout(boxes, 0.0, 0.0)
     broadest = float(boxes[:, 0].max()) + 2 * gap
+    highest = float(boxes[:, 1].max()) + 2 * gap
+    if height is not None and height < highest * (1 - 1e-9):
+        raise TorchfairError(f"sheet_height: a strip needs {highest:.6g} with gaps, the sheet has {height:.6g}")
     if width is not None:
         if width < broadest * (1 - 1e-9):
             raise TorchfairError(f"sheet_width: a strip needs {broadest:.6g} with gaps, the sheet has {width:.6g}")
-        return _first_fit(boxes, gap, width)._replace(width=width)
+        return _first_fit(boxes, gap, width, height)._replace(width=width)
     square = math.sqrt(float((boxes + gap).prod(1).sum()))
-    tried = [_first_fit(boxes, gap, max(broadest, square * step / 8)) for step in range(8, 17)]
+    tried = [_first_fit(boxes, gap, max(broadest, square * step / 8), height) for step in range(8, 17)]
     return min(tried, key=lambda layout: layout.width * layout.height)
 
 
-def _first_fit(boxes: Floats, gap: float, width: float) -> Layout:
+def _first_fit(boxes: Floats, gap: float, width: float, height: float | None) -> Layout:
     """Every box goes to the first row that has room for it; the sheet is as wide as the fullest row."""
     corners = np.zeros_like(boxes)
     rows: list[list[float]] = []  # where the next box goes in each row: x, y
-    top = gap
+    top, sheet = gap, 0
     for box in np.lexsort((-boxes[:, 0], -boxes[:, 1])).tolist():
         across, up = boxes[box].tolist()
         row = next((row for row in rows if row[0] + across + gap <= width * (1 + 1e-9)), None)
         if row is None:
+            if height is not None and top + up + gap > (sheet + 1) * height * (1 + 1e-9):
+                sheet += 1
+                top = sheet * height + gap
             row = [gap, top]
             rows.append(row)
             top += up + gap
         corners[box] = row
         row[0] += across + gap
-    return Layout(corners, max(row[0] for row in rows), top)
+    total = top if height is None else (sheet + 1) * height
+    return Layout(corners, max(row[0] for row in rows), total, sheet + 1)

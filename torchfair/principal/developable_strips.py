@@ -29,11 +29,12 @@ class DevelopableStrips:
         vertices: (2N, 3) float64 in space.
         topology: quads, one after the other along each strip.
         uv: (2N, 2) float64 on the sheet, in the same length unit, lower left corner of the sheet at 0.
-        sheet: width and height of the sheet.
+        sheet: width and height of the sheet; of all of them above each other, if there are several.
         mesh_vertices: (N,) vertex of the mesh that each ruling stands on.
         offsets: (S+1,) rulings of strip s are ``offsets[s]`` to ``offsets[s + 1] - 1``.
         polylines: (S,) number of the polyline that each strip belongs to.
         names: (S,) number of the polyline counted from 1, with a letter where it was cut into several strips.
+        sheets: how many there are, of equal height.
     """
 
     vertices: Tensor
@@ -44,6 +45,7 @@ class DevelopableStrips:
     offsets: Tensor
     polylines: Tensor
     names: tuple[str, ...]
+    sheets: int = 1
 
     def __repr__(self) -> str:
         return f"DevelopableStrips({len(self.names)} strips, {self.topology.num_faces} quads)"

@@ -14,7 +14,8 @@ from ._strip_drawing import StripDrawing, draw_strips
 from .developable_strips import DevelopableStrips
 
 _CUT, _SCORE, _LABEL = "#ff0000", "#0000ff", "#000000"
-_CUT_COLOR, _SCORE_COLOR, _LABEL_COLOR = 1, 5, 7  # the same as DXF color indices
+_SHEET = "#999999"
+_CUT_COLOR, _SCORE_COLOR, _LABEL_COLOR, _SHEET_COLOR = 1, 5, 7, 8  # the same as DXF color indices
 
 
 def save_strips_obj(path: str | os.PathLike[str], strips: DevelopableStrips, *, overwrite: bool = False) -> None:
@@ -48,8 +49,10 @@ def save_strips_svg(
     """Draws the sheet with the strips, true to scale: the unit of the drawing is the millimetre.
 
     Group ``cut`` (red) holds the closed outlines, ``score`` (blue) the rulings inside the strips, along which they
-    are folded or bent, and ``label`` (black) the names, such as #3b. Names run along the polylines with their top
-    towards the vertex normals. The y axis of the strips points upwards, as in the file of :func:`save_strips_dxf`.
+    are folded or bent, and ``label`` (black) the names, such as #3b, along the polylines and upright: vertex
+    normals point to their top, or to their foot where a v stands behind. Lines are a 1500th of the longer side of a
+    sheet wide. Where there are several sheets, group ``sheet`` (grey) holds their rims.
+    The y axis of the strips points upwards, as in the file of :func:`save_strips_dxf`.
 
     Args:
         path: the file, with the extension .svg.
@@ -70,7 +73,8 @@ def save_strips_dxf(
 ) -> None:
     """As :func:`save_strips_svg`, in DXF (AutoCAD 2010) by the package ezdxf, ``pip install 'torchfair[dxf]'``.
 
-    Layers CUT, SCORE and LABEL hold closed LWPOLYLINE, LINE and TEXT entities; the unit is the millimetre.
+    Layers CUT, SCORE and LABEL hold closed LWPOLYLINE, LINE and TEXT entities, SHEET the rims of several sheets; the
+    unit is the millimetre.
 
     Raises:
         TorchfairError: if ezdxf is missing, ``millimetres`` is not positive or there are no strips.
@@ -92,6 +96,7 @@ def _checked(path: str | os.PathLike[str], suffix: str) -> Path:
 
 def _svg(drawing: StripDrawing) -> str:
     width, height = drawing.size
+    stroke = f"{drawing.stroke:.4g}"
 
     def point(x: float, y: float) -> str:
         return f"{x:.12g},{height - y:.12g}"
@@ -99,9 +104,10 @@ def _svg(drawing: StripDrawing) -> str:
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.12g}mm" height="{height:.12g}mm" '
         f'viewBox="0 0 {width:.12g} {height:.12g}">',
-        f'<g id="cut" fill="none" stroke="{_CUT}" stroke-width="0.1">',
+        *_svg_sheets(drawing),
+        f'<g id="cut" fill="none" stroke="{_CUT}" stroke-width="{stroke}">',
         *(f'<path d="M{" ".join(point(x, y) for x, y in line.tolist())}Z"/>' for line in drawing.outlines),
-        f'</g>\n<g id="score" fill="none" stroke="{_SCORE}" stroke-width="0.1">',
+        f'</g>\n<g id="score" fill="none" stroke="{_SCORE}" stroke-width="{stroke}">',
         *(f'<path d="M{point(*a)} {point(*b)}"/>' for a, b in drawing.scores.tolist()),
         f'</g>\n<g id="label" fill="{_LABEL}" font-family="sans-serif" text-anchor="middle">',
     ]
@@ -109,6 +115,19 @@ def _svg(drawing: StripDrawing) -> str:
         turn = f"translate({point(x, y)}) rotate({-angle:.6g})"
         lines.append(f'<text transform="{turn}" y="{0.35 * size:.6g}" font-size="{size:.6g}">{text}</text>')
     return "\n".join([*lines, "</g>\n</svg>\n"])
+
+
+def _svg_sheets(drawing: StripDrawing) -> list[str]:
+    """The rims of sheets, if there are several."""
+    if drawing.sheets == 1:
+        return []
+    (width, height), stroke = drawing.size, f"{drawing.stroke:.4g}"
+    high = height / drawing.sheets
+    rims = [
+        f'<rect x="0" y="{number * high:.12g}" width="{width:.12g}" height="{high:.12g}"/>'
+        for number in range(drawing.sheets)
+    ]
+    return [f'<g id="sheet" fill="none" stroke="{_SHEET}" stroke-width="{stroke}">', *rims, "</g>"]
 
 
 def _dxf(drawing: StripDrawing) -> bytes:
@@ -120,6 +139,13 @@ def _dxf(drawing: StripDrawing) -> bytes:
     for layer, color in (("CUT", _CUT_COLOR), ("SCORE", _SCORE_COLOR), ("LABEL", _LABEL_COLOR)):
         document.layers.add(layer, color=color)
     space = document.modelspace()
+    if drawing.sheets > 1:
+        document.layers.add("SHEET", color=_SHEET_COLOR)
+    width, high = drawing.size[0], drawing.size[1] / drawing.sheets
+    for number in range(drawing.sheets if drawing.sheets > 1 else 0):
+        low = number * high
+        rim = [(0.0, low), (width, low), (width, low + high), (0.0, low + high)]
+        space.add_lwpolyline(rim, close=True, dxfattribs={"layer": "SHEET"})
     for line in drawing.outlines:
         space.add_lwpolyline(line.tolist(), close=True, dxfattribs={"layer": "CUT"})
     for a, b in drawing.scores.tolist():

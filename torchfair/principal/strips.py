@@ -29,6 +29,7 @@ def developable_strips(
     depth: float = 0.0,
     gap: float | None = None,
     sheet_width: float | None = None,
+    sheet_height: float | None = None,
 ) -> DevelopableStrips:
     """Strips of quads ``v, w, w + h n(w), v + h n(v)`` along polylines, unrolled and laid out on a sheet.
 
@@ -37,7 +38,7 @@ def developable_strips(
 
     Closed polylines are cut at their first vertex. Strips that would overlap themselves on the sheet, as rings that
     wind round more than once do, are cut into pieces that do not, if possible equally long ones; so are strips that
-    are too long for the sheet. On the sheet strips lie in rows, those with high bounding boxes first.
+    are too long or too high for the sheet. On the sheet strips lie in rows, those with high bounding boxes first.
 
     Args:
         vertices: (V, 3) positions, any length unit.
@@ -46,8 +47,12 @@ def developable_strips(
         normals: (V, 3), of any length; zero vectors where there is none: strips leave out the edges there.
         height: from the mesh to the side of the normals, in the unit of the vertices.
         depth: from the mesh to the other side.
-        gap: distance between strips on the sheet and to its rim; a quarter of the width of the strips by default.
+        gap: distance between strips on the sheet and to its rim, at least as much as the cut and the thickness of the
+            material ask for; a quarter of the width of the strips by default.
         sheet_width: width of the sheet; by default the best of several, from about square to twice as broad as that.
+
+        sheet_height: height of a sheet, of which there are as many as it takes, one above the other; by default there
+            is one, as high as it has to be.
 
     Raises:
         ShapeError: for tensors of another shape.
@@ -56,7 +61,7 @@ def developable_strips(
         MeshError: if a polyline has a vertex that does not exist, an edge has no length, a normal lies along an edge,
             or rulings meet within a strip, naming edges and :func:`strip_limits`.
     """
-    _check_lengths(height, depth, gap, sheet_width)
+    _check_lengths(height=height, depth=depth, gap=gap, sheet_width=sheet_width, sheet_height=sheet_height)
     given = prepare(vertices, polylines, normals)
     require_clear(given, height, depth)
     gap = (height + depth) / 4 if gap is None else gap
@@ -66,11 +71,11 @@ def developable_strips(
         rulings = np.stack([foot - depth * across, foot + height * across], axis=1)
         unrolled = unroll(rulings)
         for begin, end in itertools.pairwise(pieces(unrolled)):
-            for a, b, part in _fitting(unrolled, begin, end, sheet_width, gap):
+            for a, b, part in _fitting(unrolled, begin, end, (sheet_width, sheet_height), gap):
                 flat.append(part)
                 cut.append((line[a : b + 1], rulings[a : b + 1]))
                 owners.append(number)
-    layout = shelves(np.array([part.max((0, 1)) for part in flat]).reshape(-1, 2), gap, sheet_width)
+    layout = shelves(np.array([part.max((0, 1)) for part in flat]).reshape(-1, 2), gap, sheet_width, sheet_height)
     placed = [part + corner for part, corner in zip(flat, layout.corners, strict=True)]
     offsets = np.cumsum([0, *(len(line) for line, _ in cut)])
     count = int(offsets[-1])
@@ -83,26 +88,29 @@ def developable_strips(
         offsets=torch.from_numpy(offsets),
         polylines=torch.tensor(owners, dtype=torch.int64),
         names=_names(owners),
+        sheets=layout.sheets,
     )
 
 
-def _check_lengths(height: float, depth: float, gap: float | None, sheet_width: float | None) -> None:
-    for name, value in (("height", height), ("depth", depth), ("gap", gap), ("sheet_width", sheet_width)):
+def _check_lengths(**lengths: float | None) -> None:
+    for name, value in lengths.items():
         if value is not None and not (math.isfinite(value) and value >= 0):
             raise TorchfairError(f"{name}: expected a length that is finite and not negative, got {value}")
-    if not height + depth > 0:
+    if not (lengths["height"] or 0.0) + (lengths["depth"] or 0.0) > 0:
         raise TorchfairError("height: a strip needs a height or a depth above 0")
 
 
 def _fitting(
-    flat: Floats, begin: int, end: int, sheet_width: float | None, gap: float
+    flat: Floats, begin: int, end: int, sheet: tuple[float | None, float | None], gap: float
 ) -> list[tuple[int, int, Floats]]:
     """The quads from ``begin`` to ``end``, halved until they fit on the sheet: first and last ruling, and points."""
     points = upright(flat[begin : end + 1])
-    if sheet_width is None or points[..., 0].max() + 2 * gap <= sheet_width or end - begin == 1:
+    sizes = points.max((0, 1)).tolist()
+    fits = all(most is None or size + 2 * gap <= most for size, most in zip(sizes, sheet, strict=True))
+    if fits or end - begin == 1:
         return [(begin, end, points)]
     middle = (begin + end) // 2
-    return _fitting(flat, begin, middle, sheet_width, gap) + _fitting(flat, middle, end, sheet_width, gap)
+    return _fitting(flat, begin, middle, sheet, gap) + _fitting(flat, middle, end, sheet, gap)
 
 
 def _quads(offsets: Ints) -> Ints:

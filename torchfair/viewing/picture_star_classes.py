@@ -86,6 +86,11 @@ def picture_star_classes(
     return sheet.write(path, overwrite=overwrite)
 
 
+def star_class_colors(classes: StarClasses) -> Tensor:
+    """(V, 3) red, green and blue of every vertex, 0 to 1, by what its star is, as in the picture."""
+    return torch.tensor(list(_COLORS.values()))[_class_codes(classes)]
+
+
 def _class_codes(classes: StarClasses) -> Tensor:
     """(V,) number of the class of each vertex in the order of the colours."""
     codes = torch.full_like(classes.kinds, 4, dtype=torch.int64)
