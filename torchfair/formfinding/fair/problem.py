@@ -286,7 +286,7 @@ class FairProblem:
         return [term, *c.distance_limit_terms(self._surface_or_curve, self.allowed, weight=settings.quality_weight)]
 
     def _limits(self) -> Tensor | None:
-        """(V,) largest distances from the reference that are allowed; isolated vertices have none, wherever they are."""
+        """(V,) largest distances from the reference that are allowed; isolated vertices have no limit."""
         limit, used = self.distance_limit, self.topology.valences > 0
         if limit is None:
             return None
