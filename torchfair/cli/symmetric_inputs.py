@@ -79,7 +79,7 @@ def _alignment(origin: str, misalignment: float) -> str:
         return words
     return (
         f"{words}. WARNING: edges at random are 0.39 off; the surface will have to bend to fit such edges. Choose "
-        "another family by one of its edges, with --seed V W, or remesh along the directions: torchfair mesh --triangles N"
+        "another family by one of its edges, with --seed V W, or remesh by torchfair mesh --triangles N"
     )
 
 

@@ -167,18 +167,18 @@ def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis) ->
     if not negative or wrong <= _MANY * negative:
         return [f"{words}: few, so that single vertices are worth mending as listed, or all of them by torchfair fair"]
     if not topology.is_triangular:
-        return [f"{words}, too many to mend one by one: lower E by torchfair fair, or remesh by torchfair mesh"]
+        remesh = f"torchfair mesh --quads {topology.num_faces}"
+        return [f"{words}, too many to mend one by one: lower E by torchfair fair, or remesh by {remesh}"]
     try:
         aligned = principal_edges_from_directions(vertices, topology, allow_exceptions=True)
     except TorchfairError:  # stars without a normal, in a whole component
         return [f"{words}, and there are no principal directions to go by: remesh, or mend degenerate faces first"]
     off = f"the best family of parallel edges is {aligned.misalignment:.2f} radians off the nearer principal direction"
+    remesh = f"torchfair mesh --triangles {topology.num_faces}"
     if aligned.misalignment > LARGE_MISALIGNMENT:
-        return [f"{words}, and {off}: no choice of edges will do; remesh by torchfair mesh --triangles"]
+        return [f"{words}, and {off}: no choice of edges will do; remesh by {remesh}"]
     v, w = topology.edges[int(aligned.edges.mask.nonzero()[0])].tolist()
     advice = [f"{words}, and {off}: torchfair symmetric --seed {v} {w} makes saddles of negatively curved stars"]
     if aligned.misalignment > _ALIGNED:
-        advice.append(
-            "edges that far off have to turn, which bends the shape; torchfair mesh --triangles has none to turn"
-        )
+        advice.append(f"edges that far off have to turn, which bends the shape: {remesh} lays them right")
     return advice
