@@ -113,7 +113,7 @@ def test_nothing_is_written_where_there_is_no_mesh(tmp_path: Path, capsys: pytes
     shift = torch.randn(mesh.vertices.shape, generator=torch.Generator().manual_seed(0))
     path = tmp_path / "noise.obj"
     save_mesh(path, mesh.vertices + 0.2 * shift, mesh.topology)
-    words = ["--quads", "60", "--no-fallback", "--noise", "0"]
+    words = ["--quads", "60", "--no-fallback", "--noise", "2"]
     assert main(["mesh", str(path), "-o", str(tmp_path / "x.obj"), *words]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1

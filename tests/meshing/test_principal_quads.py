@@ -198,7 +198,7 @@ def test_types_come_back() -> None:
 def test_where_no_mesh_is_found_that_is_said_in_one_line() -> None:
     vertices, topology = irregular(Flat(), 300)
     vertices = vertices + 0.1 * torch.randn(vertices.shape, generator=torch.Generator().manual_seed(0))
-    settings = MeshingSettings(fallback=False, noise=0)
+    settings = MeshingSettings(fallback=False, noise=2)
     with pytest.raises(
         NoMeshError, match=r"no valid mesh was found near vertex \d+ at \(.*one setting tried"
     ) as caught:
@@ -251,7 +251,7 @@ def test_what_is_wrong_with_the_input_is_said() -> None:
     ("name", "value", "message"),
     [
         ("smoothing", 0.0, "smoothing"),
-        ("noise", -1, "noise"),
+        ("noise", 1, "noise"),
         ("noise", "much", "noise"),
         ("merging", -1.0, "merging"),
         ("align_boundary", 1, "align_boundary"),

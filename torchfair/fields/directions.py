@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from torch import Tensor
 
-from .._graph import graph_laplacian
-from ..geometry import corrected_shape_operators, vertex_areas
+from ..geometry import fitted_curvature
 from ..topology import Topology
 from .frames import Complexes, FaceFrames, Floats, Ints
 
@@ -34,30 +33,21 @@ class Directions:
     confidence: Floats
 
 
-def directions_of(vertices: Tensor, topology: Topology, frames: FaceFrames, rings: int = 1) -> Directions:
-    """Directions by corrected shape operators, each the sum over a star, then over ``rings`` rings of neighbours.
+def directions_of(vertices: Tensor, topology: Topology, frames: FaceFrames, rings: int = 2) -> Directions:
+    """Directions by polynomials fitted over rings of vertices, averaged over the corners of triangles.
 
     Args:
         vertices: (V, 3) positions.
         topology: a triangle mesh.
         frames: its frames.
-        rings: 0 for one star, 1 for smooth surfaces, up to about 5 where there is noise.
+        rings: 2 for smooth surfaces, more where there is noise; see :func:`torchfair.geometry.fitted_curvature`.
     """
-    points = vertices.detach().cpu().double()
-    operators = corrected_shape_operators(points, frames.topology).flatten(-2).numpy()
-    areas = vertex_areas(points, frames.topology).numpy()
-    if rings:
-        laplacian = graph_laplacian(frames.topology)
-        near = laplacian.copy()
-        near.data = np.ones_like(near.data)
-        for _ in range(rings):
-            operators, areas = near @ operators, near @ areas
-    whole = operators[frames.triangles].sum(1).reshape(-1, 3, 3) / areas[frames.triangles].sum(1)[:, None, None]
+    fitted = fitted_curvature(vertices.detach().cpu().double(), frames.topology, rings=rings)
+    whole = fitted.traceless.numpy()[frames.triangles].mean(1)
     axes = np.stack([frames.first, frames.second], axis=1)
     plane = axes @ whole @ axes.transpose(0, 2, 1)
-    # Shape operators of stars have the directions exchanged: half a turn of the doubled angle.
-    values = -(plane[:, 0, 0] - plane[:, 1, 1] + 1j * (plane[:, 0, 1] + plane[:, 1, 0])) / 2
-    means = (plane[:, 0, 0] + plane[:, 1, 1]) / 2
+    values = (plane[:, 0, 0] - plane[:, 1, 1] + 1j * (plane[:, 0, 1] + plane[:, 1, 0])) / 2
+    means = fitted.mean_curvatures.numpy()[frames.triangles].mean(1)
     return Directions(values, means, _confidence(values, means, frames.areas))
 
 

@@ -77,9 +77,9 @@ def read_surface(vertices: Tensor, topology: Topology, settings: MeshingSettings
     parts = components_of(vertices, topology)
     found = [part.directions(settings.noise) for part in parts]
     notes = [
-        f"{_name(number, len(parts))}the surface is rough: curvature averaged over {rings} rings"
+        f"{_name(number, len(parts))}the surface is rough: curvature fitted over {rings} rings"
         for number, (_, rings) in enumerate(found)
-        if rings > 1 and settings.noise == "auto"
+        if rings > 2 and settings.noise == "auto"
     ]
     return ReadSurface(parts, [of for of, _ in found], [rings for _, rings in found], notes)
 

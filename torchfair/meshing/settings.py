@@ -10,7 +10,7 @@ from .._numbers import check_count, check_number
 from ..errors import SettingsError
 from ..settings import setting
 
-_NOISY = 3  # rings
+_NOISY = 4  # rings
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class MeshingSettings:
     Attributes:
         smoothing: Length over which directions are smoothed, in edge lengths of the new mesh; ``"auto"`` takes a
             quarter, and one where there is noise.
-        noise: Over how many rings of vertices curvature is averaged; ``"auto"`` finds it.
+        noise: Over how many rings of vertices curvature is fitted, from 2 on; ``"auto"`` finds it by the noise.
         merging: Singular vertices that are closer than this are merged, in edge lengths of the new mesh.
         align_boundary: Whether parts of the boundary that nearly follow a direction become lines of the mesh.
         boundary_angle: How far they may turn from the direction, radians.
@@ -45,7 +45,7 @@ class MeshingSettings:
         if self.smoothing != "auto":
             check_number("smoothing (or 'auto')", self.smoothing, above=True, finite=True)
         if self.noise != "auto":
-            check_count("noise (or 'auto')", self.noise, least=0)
+            check_count("noise (or 'auto')", self.noise, least=2)
         check_number("merging", self.merging, finite=True)
         for name in ("align_boundary", "fallback"):
             if not isinstance(getattr(self, name), bool):

@@ -14,14 +14,11 @@ from .._half_edges import first_few
 from .._one_mesh import one_mesh
 from ..errors import MeshError
 from ..fields import Directions, FaceFrames, carried_directions, directions_of
-from ..geometry import degenerate_faces
+from ..geometry import degenerate_faces, rings_for_noise
 from ..subdivision import midpoint
 from ..topology import Topology
 from ..triangulation import triangulate
 
-_RINGS = (1, 2, 3, 5, 7, 10)
-_SMOOTH = 0.005  # radians between directions of neighbouring triangles that are not looked into
-_GAIN = 1.2  # by which they fall where there is noise
 _COARSE = 1.0  # mean edge over the spacing above which triangles are cut
 _MOST_FACES = 40_000  # that are made by cutting
 
@@ -46,24 +43,9 @@ class DesignSurface:
         return FaceFrames.of(self.vertices, self.topology)
 
     def directions(self, rings: int | Literal["auto"]) -> tuple[Directions, int]:
-        """Principal directions by so many rings, and their number.
-
-        Noise is what averaging takes away; the turning of directions along the surface it leaves. So ``"auto"`` takes
-        more rings as long as neighbouring triangles then agree much better.
-        """
-        if rings != "auto":
-            return directions_of(self.vertices, self.topology, self.frames, rings), rings
-        best = directions_of(self.vertices, self.topology, self.frames, _RINGS[0])
-        rough, number = _roughness(self.frames, best), _RINGS[0]
-        for more in _RINGS[1:]:
-            if rough <= _SMOOTH:
-                break
-            wider = directions_of(self.vertices, self.topology, self.frames, more)
-            then = _roughness(self.frames, wider)
-            if rough < _GAIN * then:
-                break
-            best, rough, number = wider, then, more
-        return best, number
+        """Principal directions by so many rings, and their number; ``"auto"`` chooses it by the noise."""
+        number = rings_for_noise(self.vertices, self.topology) if rings == "auto" else rings
+        return directions_of(self.vertices, self.topology, self.frames, number), number
 
     def cut_finer(self, directions: Directions, spacing: float) -> tuple[DesignSurface, Directions]:
         """Triangles fine enough for edges of a length, on the same flat pieces."""
@@ -76,17 +58,6 @@ class DesignSurface:
             directions = carried_directions(directions, surface.frames, cut.frames, parents)
             surface = cut
         return surface, directions
-
-
-def _roughness(frames: FaceFrames, directions: Directions) -> float:
-    """Median angle between principal directions across edges, over those that are sure."""
-    f, g = frames.faces.T
-    turned = directions.values[g] * (directions.values[f] * np.exp(2j * frames.turns)).conj()
-    sure = np.minimum(directions.confidence[f], directions.confidence[g]) > 0.2
-    if not sure.any():
-        return 0.0
-    quarter = np.angle(turned[sure] ** 2) / 4  # up to quarter turns, so that curvatures may change places
-    return float(np.median(np.abs(quarter)))
 
 
 def components_of(vertices: Tensor, topology: Topology) -> list[DesignSurface]:
