@@ -40,7 +40,7 @@ def test_numbers_of_a_preset_go_by_the_papers_names(kind: type) -> None:
         ("paper,w_far=1", "numbers of the preset 'paper' are w_reg, w_fair, .* as NAME=X, got 'w_far=1'"),
         ("paper,w_fair", "as NAME=X, got 'w_fair'"),
         ("paper,w_fair=much", "preset 'paper': w_fair must be a number, got 'much'"),
-        ("paper,steps=1.5", "steps must be a number, got '1.5'"),
+        ("paper,steps=1.5", "steps must be a whole number, got '1.5'"),
         ("paper,w_fair=-1", "fairness_weight=-4.0"),
         ("paper,w_reg=0", "initial_damping"),
     ],

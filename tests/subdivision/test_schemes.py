@@ -249,3 +249,12 @@ def test_errors_name_cause_and_remedy() -> None:
     for corners in ([0, 1], torch.ones(8), torch.ones(7, dtype=torch.bool)):
         with pytest.raises(ShapeError, match=r"corners: expected a bool tensor \(8,\)"):
             hybrid(quads, corners=corners)
+
+
+@pytest.mark.parametrize("scheme", ["hybrid", "midpoint", "catmull_clark"])
+def test_levels_that_no_machine_holds_are_refused_by_the_faces_they_make(scheme: str) -> None:
+    """The number that is named is that of a smaller level times four for each level more."""
+    _, mixed = mixed_grid()
+    faces = refine(mixed, scheme, 2).topology.num_faces * 4**12
+    with pytest.raises(TorchfairError, match=f"levels: 14 make {faces} faces of {mixed.num_faces}"):
+        refine(mixed, scheme, 14)

@@ -40,7 +40,9 @@ def _number(word: str, preset: str, numbers: Mapping[str, inspect.Parameter]) ->
     key, sign, value = word.partition("=")
     if key not in numbers or not sign:
         raise SettingsError(f"numbers of the preset '{preset}' are {', '.join(numbers)}, as NAME=X, got '{word}'")
+    kind = type(numbers[key].default)
     try:
-        return key, type(numbers[key].default)(value)
+        return key, kind(value)
     except ValueError:
-        raise SettingsError(f"preset '{preset}': {key} must be a number, got '{value}'") from None
+        wanted = "a whole number" if kind is int else "a number"
+        raise SettingsError(f"preset '{preset}': {key} must be {wanted}, got '{value}'") from None

@@ -20,6 +20,8 @@ from .refinement import Origin, Refinement
 
 Scheme = Literal["loop", "catmull_clark", "hybrid", "midpoint"]
 
+_MOST_FACES = 10_000_000  # about a kilobyte each while they are made
+
 
 def refine(
     topology: Topology,
@@ -43,16 +45,27 @@ def refine(
         All steps in one, see :meth:`Refinement.then`.
 
     Raises:
-        TorchfairError: for an unknown scheme or a negative number of levels, and as the scheme itself.
+        TorchfairError: for an unknown scheme, a negative number of levels or one that makes more than ten million
+            faces, and as the scheme itself.
     """
     if levels < 0:
         raise TorchfairError(f"levels: expected 0 or more, got {levels}")
     step = _step(scheme, boundary)
+    faces = _faces_after(topology, scheme, levels)
+    if levels and faces > _MOST_FACES:
+        raise TorchfairError(f"levels: {levels} make {faces} faces of {topology.num_faces}, more than {_MOST_FACES}")
     whole = _unrefined(topology)
     for _ in range(levels):
         finer = step(whole.topology, None if corners is None else whole.carry_vertex_labels(corners))
         whole = whole.then(finer)
     return whole
+
+
+def _faces_after(topology: Topology, scheme: Scheme, levels: int) -> int:
+    """A triangle makes four, any other face of k corners k quads; by Catmull and Clark's scheme triangles, too."""
+    corners, triangles = topology.corners.shape[0], int((topology.face_sizes == 3).sum())
+    first = corners if scheme == "catmull_clark" else corners + triangles
+    return first * 4 ** (levels - 1) if levels else topology.num_faces
 
 
 def _step(scheme: Scheme, boundary: Boundary) -> Callable[[Topology, Tensor | None], Refinement]:
