@@ -32,17 +32,19 @@ def cleaned(path: Path, rows: Floats, *, close: bool) -> Cleaned:
     Raises:
         MeshFileError: fewer than three points are left, or the curve is an open arc that is not to be closed.
     """
-    points, notes = rows[:, :3], []
+    largest = float(np.abs(rows[:, :3]).max(initial=0.0))
+    unit = 2.0 ** np.frexp(largest)[1] if largest else 1.0
+    points, notes = rows[:, :3] / unit, []  # so that no distance overflows
     extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     exact = len(rows) > 1 and bool((points[0] == points[-1]).all())
     if len(rows) > 1 and np.linalg.norm(points[0] - points[-1]) <= SAME * extent:
         if not exact:
-            gap = np.linalg.norm(points[0] - points[-1])
+            gap = unit * np.linalg.norm(points[0] - points[-1])
             notes.append(f"{path.name}: the last point is {gap:.2g} from the first one: taken for the same")
-        rows = rows[:-1]
+        rows, points = rows[:-1], points[:-1]
     elif len(rows) > 2:
-        _refuse_open(path, points, notes, close)
-    steps = np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1)
+        _refuse_open(path, points, unit, notes, close)
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     repeated = np.flatnonzero(steps <= SAME * extent) + 1
     if repeated.size:
         named = ", ".join(map(str, repeated[:5].tolist())) + (", ..." if repeated.size > 5 else "")
@@ -53,15 +55,14 @@ def cleaned(path: Path, rows: Floats, *, close: bool) -> Cleaned:
     return Cleaned(rows, notes)
 
 
-def _refuse_open(path: Path, points: Floats, notes: list[str], close: bool) -> None:
-    gap, longest = (float(x) for x in (
-        np.linalg.norm(points[0] - points[-1]), np.linalg.norm(np.diff(points, axis=0), axis=1).max()
-    ))  # fmt: skip
+def _refuse_open(path: Path, points: Floats, unit: float, notes: list[str], close: bool) -> None:
+    gap = float(np.linalg.norm(points[0] - points[-1]))
+    longest = float(np.linalg.norm(np.diff(points, axis=0), axis=1).max())
     if gap <= _OPEN * longest:
         return
     if not close:
-        raise open_curve(path, gap)
-    notes.append(f"{path.name}: closed by a straight line of length {gap:.4g}")
+        raise open_curve(path, unit * gap)
+    notes.append(f"{path.name}: closed by a straight line of length {unit * gap:.4g}")
 
 
 def open_curve(path: Path, gap: float) -> MeshFileError:
