@@ -17,7 +17,7 @@ CORNERS = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, -1.0, 0.0)]
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.tuples(NUMBERS, NUMBERS, NUMBERS), st.floats(1e-300, 1e300), st.sampled_from(" ,;"))
+@given(st.tuples(NUMBERS, NUMBERS, NUMBERS), st.floats(1e-300, 1e308), st.sampled_from(" ,;"))
 def test_points_come_back_exactly(
     tmp_path: Path, normal: tuple[float, float, float], size: float, separator: str
 ) -> None:

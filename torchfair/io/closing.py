@@ -33,7 +33,7 @@ def cleaned(path: Path, rows: Floats, *, close: bool) -> Cleaned:
         MeshFileError: fewer than three points are left, or the curve is an open arc that is not to be closed.
     """
     largest = float(np.abs(rows[:, :3]).max(initial=0.0))
-    unit = 2.0 ** np.frexp(largest)[1] if largest else 1.0
+    unit = 2.0 ** float(np.frexp(largest)[1] - 1) if largest else 1.0
     points, notes = rows[:, :3] / unit, []  # so that no distance overflows
     extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     exact = len(rows) > 1 and bool((points[0] == points[-1]).all())
