@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,7 @@ from .surface import DesignSurface, components_of
 from .verification import Shape, shape_of
 
 _CORRECTIONS = 2
+_SHARE = 1 / 6  # of the time limit, for a correction
 _COUNT_TOLERANCE = 0.08
 
 
@@ -169,6 +170,7 @@ def mesh_to_count(
         NoMeshError: if the first spacing gives no valid mesh.
     """
     best = mesh_components(surface, lattices, spacing, settings)
+    short = replace(settings, time_limit=settings.time_limit * _SHARE)
     for _ in range(_CORRECTIONS if count is not None else 0):
         assert count is not None
         ratio = faces_of(best) / count
@@ -176,7 +178,7 @@ def mesh_to_count(
             break
         other = spacing * math.sqrt(ratio)
         try:
-            again = mesh_components(surface, lattices, other, settings)
+            again = mesh_components(surface, lattices, other, short)
         except NoMeshError:
             break
         if abs(faces_of(again) / count - 1) >= abs(ratio - 1) or len(again.notes) > len(best.notes):

@@ -26,7 +26,7 @@ class MeshingSettings:
         boundary_angle: How far they may turn from the direction, radians.
         corner_angle: Boundary vertices that turn by more are corners and stay, radians.
         fallback: Whether other settings are tried where these give no valid mesh; what was taken is said.
-        time_limit: No other settings are tried after so many seconds.
+        time_limit: No other settings are tried after so many seconds for a component.
 
     Raises:
         SettingsError: a setting is out of its range; names it.
@@ -39,7 +39,7 @@ class MeshingSettings:
     boundary_angle: float = setting(math.radians(12.0), unit="radians")
     corner_angle: float = setting(math.radians(40.0), unit="radians")
     fallback: bool = True
-    time_limit: float = setting(45.0, unit="seconds")
+    time_limit: float = setting(40.0, unit="seconds")
 
     def __post_init__(self) -> None:
         if self.smoothing != "auto":
