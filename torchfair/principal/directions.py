@@ -108,8 +108,8 @@ def misalignment_of(
     Seen along the vertex normals, between a principal edge and the mean of the directions at its ends; 0 to pi/2 if a
     single direction is given. Near 0 on meshes that follow the directions. Where equilateral triangles lie at a
     constant angle to both directions, the best choice has 0.26 (15 degrees) or less; where directions turn against the
-    lattice or are noise, it tends to pi/8 = 0.39, and above ``LARGE_MISALIGNMENT``, 0.4 radians, there is little that a choice of
-    edges can do.
+    lattice or are noise, it tends to pi/8 = 0.39, and above ``LARGE_MISALIGNMENT``, 0.4 radians, there is little that a
+    choice of edges can do.
 
     Args:
         vertices: (V, 3) positions, any length unit.
