@@ -165,6 +165,11 @@ CASES: dict[str, Case] = {
         lambda v, t: c.flat_edge_terms(t, torch.arange(0, t.num_interior_edges, 2), weight=1.0),
         mixed,
     ),
+    "edge directions": Case(
+        lambda v, t: c.EdgeDirections(v, t),
+        lambda v, t: c.edge_direction_terms(v, t, torch.arange(t.num_interior_edges), weight=1.0),
+        mixed,
+    ),
     "gliding": Case(
         lambda v, t: c.Gliding(*curves(v, t)),
         lambda v, t: c.gliding_terms(c.CurveFeet(*curves(v, t)), weight=1.0),

@@ -149,6 +149,12 @@ def _(vertices: Tensor, topology: Topology) -> Terms:
     return c.flat_edge_terms(topology, chosen, weight=0.5)
 
 
+@case("edge_direction_terms", triangles, mixed)
+def _(vertices: Tensor, topology: Topology) -> Terms:
+    chosen = torch.arange(0, topology.num_interior_edges, 2, device=vertices.device)
+    return c.edge_direction_terms(vertices, topology, chosen, weight=0.5)
+
+
 @case("coplanar_terms", lattice)
 def _(vertices: Tensor, topology: Topology, edges: Tensor, stars: PrincipalStars) -> Case:
     return {"vertices": vertices, **c.sphere_blocks(vertices, stars)}, c.coplanar_terms(edges, stars, weight=2.0)

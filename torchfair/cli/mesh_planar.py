@@ -34,7 +34,7 @@ def made_planar(mesh: QuadMesh, surface: tuple[Tensor, Topology]) -> tuple[Plana
     from ..formfinding import FairSettings, minimise_normal_variation
     from ..progress import ProgressDisplay
 
-    settings = FairSettings(planar="quads", distance_limit=_DISTANCE)
+    settings = FairSettings(planar="quads", distance_limit=_DISTANCE, directions="keep")
     with ProgressDisplay(settings.projection.max_iterations) as display:
         result = minimise_normal_variation(
             mesh.vertices, mesh.topology, reference=surface, settings=settings, callback=display

@@ -13,6 +13,8 @@ from .closeness import DistanceLimit as DistanceLimit
 from .closeness import TangentPlanes as TangentPlanes
 from .closeness import closeness_terms as closeness_terms
 from .closeness import distance_limit_terms as distance_limit_terms
+from .edge_directions import EdgeDirections as EdgeDirections
+from .edge_directions import edge_direction_terms as edge_direction_terms
 from .element_quality import CornerAngles as CornerAngles
 from .element_quality import FaceAreas as FaceAreas
 from .element_quality import corner_angle_terms as corner_angle_terms

@@ -174,6 +174,7 @@ class FairProblem:
             *self.pulls.terms(weight=settings.handle_weight),
             *c.planarity_terms(self.topology, self.planar_faces, weight=_raised(settings.planarity_weight, share)),
             *self._flat(share),
+            *self._directions(),
         ]
 
     def is_planar(self, vertices: Tensor) -> bool:
@@ -270,6 +271,12 @@ class FairProblem:
         if self.settings.formulation == "lifted":
             return c.lifted_flat_edge_terms(self.topology, self.flat_edges, weight=weight)
         return c.flat_edge_terms(self.topology, self.flat_edges, weight=weight)
+
+    def _directions(self) -> list[ElementTerm]:
+        if self.settings.directions == "free":
+            return []
+        every = torch.arange(self.topology.num_interior_edges)
+        return c.edge_direction_terms(self.vertices, self.topology, every, weight=self.settings.direction_weight)
 
     def _closeness(self) -> list[ElementTerm]:
         settings, used = self.settings, self.topology.valences > 0

@@ -17,6 +17,7 @@ from ..printed import printed_projection
 Boundary = Literal["glide", "fixed", "free"]
 Planar = Literal["keep", "quads", "none"]
 Flat = Literal["keep", "all", "none"]
+Directions = Literal["free", "keep"]
 Formulation = Literal["reduced", "lifted"]
 
 
@@ -63,6 +64,9 @@ class FairSettings:
             more edges are flat than by chance.
         flat_tolerance: An edge arrives flat when its angle is at most this fraction of the mean angle of all edges.
         flat_weight: Weight of half of squared ``l l*`` of edges kept flat; where they are not flat enough it is raised.
+        directions: ``"keep"`` for edges that keep their directions within the surface, such as those of a mesh along
+            principal directions whose faces become planar; ``"free"`` lets E turn them.
+        direction_weight: Weight of half the squared sideways components of edges that keep their directions.
         smallest_angle: No corner angle falls below this (or below the smallest of the input), radians.
         smallest_area: No face falls below this fraction of its area.
         quality_weight: Weight of half the squared barriers before those bounds.
@@ -88,6 +92,8 @@ class FairSettings:
     flat: Flat | tuple[int, ...] = "keep"
     flat_tolerance: float = 1e-3
     flat_weight: float = 1e4
+    directions: Directions = "free"
+    direction_weight: float = 30.0
     smallest_angle: float = setting(math.radians(10.0), unit="radians")
     smallest_area: float = 0.2
     quality_weight: float = 0.1
@@ -144,6 +150,7 @@ class FairSettings:
 
     def __post_init__(self) -> None:
         check_choice(self, "boundary", get_args(Boundary))
+        check_choice(self, "directions", get_args(Directions))
         check_choice(self, "formulation", get_args(Formulation))
         check_weights(self)
         if isinstance(self.planar, str) and self.planar not in get_args(Planar):
