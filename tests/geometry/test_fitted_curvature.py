@@ -192,6 +192,17 @@ def test_doubts_are_the_errors_that_noise_makes() -> None:
     assert fit.doubts[:, middle].mean() == pytest.approx(float(spread), rel=0.25)
 
 
+@pytest.mark.parametrize(
+    "faces", [[[0, 1, 2, 3]], [[0, 1, 2], [0, 2, 3]], [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]]
+)
+def test_confidence_is_zero_where_nothing_is_left_to_tell_the_error_by(faces: list[list[int]]) -> None:
+    places = torch.tensor([[0, 0, 0.3], [1, 0, 0], [1, 1, 0.2], [-0.2, 1, 0], [-0.5, -1, 0]], dtype=DOUBLE)
+    topology = Topology.from_faces(faces, num_vertices=5)
+    fit = fitted_curvature(places, topology)
+    assert float(fit.traceless.abs().max()) > 0.01
+    assert float(fit.confidence.max()) == 0.0
+
+
 def test_confidence_is_zero_where_there_is_no_direction() -> None:
     for mesh in (icosphere(3), irregular_triangles(Sphere(), 1000), parameter_quads(Paraboloid(1e-9, -1e-9), 20, 20)):
         assert fitted_curvature(mesh.vertices, mesh.topology).confidence.max() < 0.05

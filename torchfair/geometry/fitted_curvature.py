@@ -20,6 +20,7 @@ from .patches import Patches
 from .tangent_basis import tangent_bases
 
 _LEAST_RINGS, _MOST_RINGS = 2, 12
+_QUADRATIC = 6  # coefficients; of no more vertices than that, nothing is left to tell the error by
 _DEGREE = 4
 _WANTED = 0.02  # relative error of the curvatures, at half of the vertices
 _NO_DIRECTION = math.radians(10.0)  # expected error of a direction from which on it is worth nothing
@@ -119,7 +120,7 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
     Returns:
         Tensors of the vertices' dtype, computed in double precision. Zeros at isolated vertices and where
         :func:`vertex_normals` is zero. Where there are too few vertices for a polynomial, its higher terms are
-        small or zero.
+        small or zero; where a patch has no more than six, directions have no confidence.
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3), or patches are of another mesh.
@@ -137,6 +138,8 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
     normals, _, _ = _forms(first)
     heights = fitted_heights(vertices, normals, patches, _DEGREE)
     normals, operators, doubts = _forms(heights)
+    whole = norm(operators.flatten(-2)).detach()
+    doubts = torch.where(patches.sizes > _QUADRATIC, doubts, torch.maximum(doubts, whole))
     return FittedCurvature(*(x.to(vertices.dtype) for x in (normals, operators, doubts, heights.scale)))
 
 

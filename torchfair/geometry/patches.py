@@ -68,6 +68,11 @@ class Patches:
             parts.append((gather(values, members) * shares[..., None]).sum(-2))
         return self.in_order(parts)
 
+    @property
+    def sizes(self) -> Tensor:
+        """(V,) numbers of members."""
+        return torch.cat([present.sum(1) for _, _, present in self.groups]).index_select(0, self.places)
+
     def in_order(self, parts: list[Tensor]) -> Tensor:
         """Values (*batch, n, d) of the groups as values (*batch, V, d) of the vertices."""
         return torch.cat(parts, dim=-2).index_select(-2, self.places)
