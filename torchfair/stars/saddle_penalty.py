@@ -54,7 +54,8 @@ def saddle_penalty(vertices: Tensor, topology: Topology, saddles: Tensor | None 
     one is not; stars on the border between the two, such as flat ones, count zero. For each star the sides on
     which edges belong are chosen at every call, exactly for good saddles and by the least violation for others, and
     the plane is the one with the least penalty, so that it may be held constant for first derivatives; see
-    ``saddle_defects`` for what is summed.
+    ``saddle_defects`` for what is summed. Of stars that noise of a quarter of an edge has torn, about one in a thousand
+    has another plane than that, and first derivatives that are some per cent off.
 
     Args:
         vertices: positions (*batch, V, 3), any length unit.
