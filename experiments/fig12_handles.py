@@ -98,6 +98,7 @@ def pulled(mesh: Mesh, config: Config, energy_weight: float) -> JobResult[Level]
         energy_weight=energy_weight,
         fairness_weight=config.fairness_weight,
         boundary="free",  # all boundary vertices are handles
+        flat="none",  # pairs of triangles are coplanar at the start by symmetry, and are no panels
         smallest_angle=math.radians(5),  # the shape changes a lot: only collapse is forbidden
         smallest_area=0.05,
     )
