@@ -132,6 +132,7 @@ def _even(
         if abs(ratio - 1.0) < _COUNT:
             break
         size, rounds = size * ratio**0.5, _MORE_ROUNDS
+        across = across * max(ratio, 1.0) ** 0.5  # narrow parts have fewer rows rather than too many vertices
     yield patch
 
 
