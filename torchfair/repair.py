@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from ._connectivity import HalfEdges, Ints, build_half_edges, first_few, pack_faces, pair_half_edges
+from ._graph import connected_in_two_colours
 from .errors import MeshError, ShapeError
 from .topology import Topology
 
@@ -90,7 +91,7 @@ def _faces_to_flip(half: HalfEdges) -> Bools:
     if not clash.any():
         return np.zeros(num_faces, bool)
     _check_twice(half, pairs[0][clash], pairs[1][clash])
-    labels = _orientation_labels(num_faces, *pairs, clash)
+    labels = connected_in_two_colours(np.stack(pairs, 1), clash, num_faces)  # as they are, and turned over
     _check_one_sided(labels)
     low = labels.min(axis=0)
     side = labels[0] == low
@@ -99,23 +100,6 @@ def _faces_to_flip(half: HalfEdges) -> Bools:
     kept_side = np.where(2 * on_side == sizes, side[lowest_face], 2 * on_side > sizes)
     flipped: Bools = side != kept_side[component]
     return flipped
-
-
-def _orientation_labels(num_faces: int, left: Ints, right: Ints, clash: Bools) -> Ints:
-    """(2, F) component of each face as it is (row 0) and turned over (row 1).
-
-    Every face is two nodes, one for each orientation; an edge joins the orientations that agree across it.
-    The two copies of an orientable component do not touch.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    rows = np.concatenate([left, left + num_faces])
-    columns = np.concatenate([right + num_faces * clash, right + num_faces * ~clash])
-    size = 2 * num_faces
-    graph = coo_array((np.ones(rows.size, np.int8), (rows, columns)), shape=(size, size))
-    _, labels = connected_components(graph, directed=False)
-    return np.asarray(labels, np.int64).reshape(2, num_faces)
 
 
 def _check_one_sided(labels: Ints) -> None:

@@ -1,10 +1,10 @@
 """All numbers of a mesh at once, as ``torchfair measure`` and ``torchfair diagnose`` print them."""
 
+from .._graph import count_components as count_components
 from .diagnosis import Diagnosis as Diagnosis
 from .diagnosis import diagnose_mesh as diagnose_mesh
 from .measurements import EdgeMeasures as EdgeMeasures
 from .measurements import Quantity as Quantity
-from .measurements import count_components as count_components
 from .measurements import measure_mesh as measure_mesh
 from .measurements import worst_edges as worst_edges
 from .pattern_words import pattern_words as pattern_words

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
-import torch
 from torch import Tensor
 
 from .. import energies, geometry
+from .._graph import count_components
 from .._one_mesh import one_mesh
 from ..errors import ShapeError
 from ..topology import Topology
@@ -135,18 +135,6 @@ def _counts(vertices: Tensor, topology: Topology) -> list[Quantity]:
         "euler_characteristic": used - topology.num_edges + topology.num_faces,
     }
     return [Quantity(key, value, "dimensionless", "mesh") for key, value in counts.items()]
-
-
-def count_components(topology: Topology) -> int:
-    """Number of connected pieces; isolated vertices do not count."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    start, stop = topology.edges.cpu().numpy().T
-    size = topology.num_vertices
-    graph = coo_array((torch.ones(len(start)).numpy(), (start, stop)), shape=(size, size))
-    pieces, _ = connected_components(graph, directed=False)
-    return int(pieces) - int((topology.valences == 0).sum())
 
 
 def _energy(key: str) -> Callable[[Tensor, Topology], Tensor]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
+from .._graph import connected
 from ..fields.frames import Bools, FaceFrames, Floats, Ints
 from .chords import BrokenLinesError, Chords, LatticePoints
 from .crossings import Crossings
@@ -138,8 +137,7 @@ def _join(segments: _Segments, is_through: Bools) -> Darts:
     if (np.bincount(dart_origin[order], minlength=len(is_through))[is_through] != 2).any():
         raise BrokenLinesError("a line of the map ends at an edge")
     a, b = owner[order[::2]], owner[order[1::2]]
-    graph = sp.coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(count, count))
-    label = connected_components(graph, directed=False)[1] if count else np.zeros(0, np.int64)
+    label = connected(np.stack([a, b], 1), count)
     ends = np.flatnonzero(~is_through[dart_origin])
     ends = ends[np.argsort(label[owner[ends]], kind="stable")]
     labels = label[owner[ends]]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
+from .._graph import connected
 from ..fields.frames import FaceFrames, Ints
 from .cut_graph import CutGraph
 
@@ -129,8 +129,7 @@ def _copies(frames: FaceFrames, graph: CutGraph) -> Ints:
     ours = np.concatenate([3 * f + i, 3 * f + (i + 1) % 3])
     theirs = np.concatenate([3 * g + (j + 1) % 3, 3 * g + j])
     count = 3 * len(frames.triangles)
-    joined = sp.coo_matrix((np.ones(len(ours), np.int8), (ours, theirs)), shape=(count, count))
-    return np.asarray(connected_components(joined, directed=False)[1], np.int64).reshape(-1, 3)
+    return connected(np.stack([ours, theirs], 1), count).reshape(-1, 3)
 
 
 def _links(frames: FaceFrames, graph: CutGraph, copies: Ints) -> dict[int, list[Link]]:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-import numpy as np
 import torch
 from torch import Tensor
 
+from .._graph import face_components
 from .._half_edges import first_few
 from .._one_mesh import one_mesh
 from ..errors import MeshError
@@ -67,9 +67,6 @@ def components_of(vertices: Tensor, topology: Topology) -> list[DesignSurface]:
         ShapeError: if it is not one mesh.
         MeshError: if there is no face, a coordinate is not finite, or a face has no area.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     points, topology = one_mesh(vertices, topology).cpu().double(), topology.to("cpu")
     if not topology.num_faces:
         raise MeshError("the surface has no faces. Give a mesh with at least one face.")
@@ -81,12 +78,10 @@ def components_of(vertices: Tensor, topology: Topology) -> list[DesignSurface]:
         raise MeshError(f"{len(flat)} face(s) have no area: faces {first_few(flat, len(flat))}. Remove or remesh them.")
     triangles = triangulate(points, topology).triangles
     whole = Topology.from_faces(triangles, topology.num_vertices)
-    f, g = whole.interior_edge_faces.numpy().T
-    count = whole.num_faces
-    labels = connected_components(coo_array((np.ones(len(f)), (f, g)), shape=(count, count)), directed=False)[1]
+    labels = face_components(whole)
     parts = []
-    for label in range(labels.max() + 1):
-        chosen = triangles[torch.from_numpy(labels == label)]
+    for label in range(int(labels.max()) + 1):
+        chosen = triangles[labels == label]
         numbers, corners = torch.unique(chosen, return_inverse=True)
         parts.append(DesignSurface(points[numbers], Topology.from_faces(corners, len(numbers)), numbers))
     return parts

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import torch
-
+from .._graph import count_components
 from ..errors import MeshError
 from ..topology import Topology
 
@@ -20,16 +19,9 @@ class Shape(NamedTuple):
 
 def shape_of(topology: Topology) -> Shape:
     """Euler number, number of boundary loops and of components; isolated vertices are not counted."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     used = int((topology.valences > 0).sum())
-    v, w = topology.edges.cpu().numpy().T
-    size = topology.num_vertices
-    graph = coo_array((torch.ones(len(v)).numpy(), (v, w)), shape=(size, size))
-    components = connected_components(graph, directed=False)[0] - (size - used)
     euler_number = used - topology.num_edges + topology.num_faces
-    return Shape(euler_number, topology.loop_offsets.shape[0] - 1, int(components))
+    return Shape(euler_number, topology.loop_offsets.shape[0] - 1, count_components(topology))
 
 
 def verified_topology(faces: list[list[int]], num_vertices: int, wanted: Shape) -> Topology:

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from .._graph import connected
 from ..topology import Topology
 
 Ints = npt.NDArray[np.int64]
@@ -122,10 +123,5 @@ def sides_of(rule: Differences, marked: npt.NDArray[np.bool_]) -> Ints:
 
 def face_components(rule: Differences) -> tuple[Ints, int]:
     """(F,) number of the component that each face is in, connected across edges; and how many there are."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    size = len(rule.side_edges)
-    graph = coo_array((np.ones(len(rule.faces)), rule.faces.T), shape=(size, size))
-    count, components = connected_components(graph, directed=False)
-    return components.astype(np.int64), int(count)
+    components = connected(rule.faces, len(rule.side_edges))
+    return components, int(components.max(initial=-1)) + 1

@@ -11,11 +11,10 @@ Where quads follow principal directions, "suitable diagonals" make two triangles
 
 from __future__ import annotations
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from .._graph import edge_numbers
+from .._graph import connected_in_two_colours, edge_numbers, face_components
 from .._half_edges import first_few
 from ..errors import MeshError
 from ..topology import Topology
@@ -140,7 +139,7 @@ def _sides(topology: Topology) -> Tensor:
 
 def _chosen(vertices: Tensor, topology: Topology, turned: Tensor, seed_edge: int | None) -> Tensor:
     """The family (F,) that holds the seed in its component; in others, and without a seed, the one that bends less."""
-    components = _components(topology)
+    components = face_components(topology)
     other = _bends_less(vertices, topology, turned, components)
     if seed_edge is not None:
         if not 0 <= seed_edge < topology.num_edges:
@@ -169,17 +168,6 @@ def _bends_less(vertices: Tensor, topology: Topology, turned: Tensor, components
     return bends[0] > bends[1]
 
 
-def _components(topology: Topology) -> Tensor:
-    """(F,) component of every face, connected across edges."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    left, right = topology.interior_edge_faces.numpy().T
-    size = topology.num_faces
-    graph = coo_array((np.ones(len(left)), (left, right)), shape=(size, size))
-    return torch.from_numpy(connected_components(graph, directed=False)[1]).long()
-
-
 def two_colours(count: int, pairs: Tensor, differ: Tensor) -> tuple[Tensor, Tensor]:
     """Two colours of things 0..count-1 such that the two of each pair have different ones exactly where they are to.
 
@@ -191,13 +179,5 @@ def two_colours(count: int, pairs: Tensor, differ: Tensor) -> tuple[Tensor, Tens
     Returns:
         (count,) bool; and the things that can have neither, since an odd number of changes leads back to them.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    first, second = pairs.cpu().numpy().T
-    change = differ.cpu().numpy()
-    ends = np.concatenate([first, first + count])  # every thing in both colours, joined to what goes with it
-    others = np.concatenate([second + count * change, second + count * ~change])
-    joined = coo_array((np.ones(len(ends)), (ends, others)), shape=(2 * count, 2 * count))
-    plain, coloured = torch.from_numpy(connected_components(joined, directed=False)[1]).long().view(2, count)
+    plain, coloured = torch.from_numpy(connected_in_two_colours(pairs.cpu().numpy(), differ.cpu().numpy(), count))
     return plain > coloured, torch.nonzero(plain == coloured).squeeze(1)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import torch
 from torch import Tensor
 
+from ..._graph import connected, face_components
 from ...constraints.normal_variation import edge_stencils
 from ...errors import MeshError
 from ...geometry import corner_angles, dihedral_angles
@@ -65,8 +65,8 @@ def _in_panels(vertices: Tensor, topology: Topology, flat: Tensor) -> Tensor:
     triangles are joined in pairs, the most rectangular first.
     """
     sides = topology.interior_edge_faces
-    regions = _components(sides[flat], topology.num_faces)
-    whole = _components(sides, topology.num_faces)
+    regions = torch.from_numpy(connected(sides[flat].numpy(), topology.num_faces))
+    whole = face_components(topology)
     size, diagonals = torch.bincount(regions), torch.bincount(regions[sides[flat, 0]], minlength=int(regions.max()) + 1)
     of_all = torch.bincount(whole)[whole]
     is_part = torch.zeros_like(size, dtype=torch.bool).index_fill(0, regions[size[regions] < of_all], True)
@@ -77,16 +77,6 @@ def _in_panels(vertices: Tensor, topology: Topology, flat: Tensor) -> Tensor:
     kept = is_panel[owners] & ~several[owners]
     kept[loose] = _paired(vertices, topology, flat[loose])
     return kept
-
-
-def _components(pairs: Tensor, count: int) -> Tensor:
-    """(count,) numbers of the components of a graph with edges ``pairs`` (n, 2)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    first, second = pairs.numpy().T
-    graph = coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
-    return torch.from_numpy(connected_components(graph, directed=False)[1]).long()
 
 
 def _have_straight_corners(vertices: Tensor, topology: Topology, regions: Tensor) -> Tensor:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...._graph import connected
 from .patch import Edges, Floats, Ints, edges_of
 
 
@@ -18,8 +19,6 @@ def hull_between(points: Floats, rims: Ints, edges: Ints) -> Ints | None:
         rims: (V,) which rim a point belongs to.
         edges: (E, 2) of the rims.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -35,9 +34,7 @@ def hull_between(points: Floats, rims: Ints, edges: Ints) -> Ints | None:
     rim_keys = np.sort(edges, axis=1) @ np.array([len(points), 1])
     if not np.isin(rim_keys, keys).all():
         return None
-    sides = _sides(known, np.isin(keys, rim_keys))
-    count = len(faces)
-    _, parts = connected_components(coo_array((np.ones(len(sides)), sides.T), shape=(count, count)), directed=False)
+    parts = connected(_sides(known, np.isin(keys, rim_keys)), len(faces))
     for part in np.unique(parts):
         mine = faces[parts == part]
         outline = edges_of(mine)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ...._graph import connected
 from ....curves import ClosedCurve
 from .patch import Edges, Floats, Ints, Mask, Patch, edges_of, middle_parameters
 from .remeshing import on_curves
@@ -125,18 +126,12 @@ def _enclosed(places: Floats, plan: Floats, edges: Ints) -> Mask:
 
 def _covers(patch: Patch, edges: Ints) -> bool:
     """Whether the boundary of the faces is the rims, and they hang together."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     if not len(patch.faces):
         return False
     known = edges_of(patch.faces)
     if int(known.boundary.sum()) != len(edges) or not _contains(known, edges, len(patch.points)).all():
         return False
-    v, w = known.ends.T
-    count = len(patch.points)
-    pieces, _ = connected_components(coo_array((np.ones(len(v)), (v, w)), shape=(count, count)), directed=False)
-    return int(pieces) == 1
+    return not connected(known.ends, len(patch.points)).any()
 
 
 def _halved(patch: Patch, edges: Ints, chosen: Mask, curves: Sequence[ClosedCurve]) -> tuple[Patch, Ints]:
