@@ -267,6 +267,13 @@ class Topology:
         if vertices.shape[-2:] != (self.num_vertices, 3) or not vertices.is_floating_point():
             raise self._vertices_error(f"{tuple(vertices.shape)} {vertices.dtype}")
 
+    def check_interior_edges(self, edges: Tensor, what: str = "") -> None:
+        """Raises MeshError unless ``edges`` (n,) are numbers of interior edges; ``what`` they are for comes first."""
+        count = self.num_interior_edges
+        wrong = edges[(edges < 0) | (edges >= count)]
+        if wrong.numel():
+            raise MeshError(f"{what}interior edges are numbered 0 to {count - 1}, got {wrong[:5].tolist()}")
+
     def _vertices_error(self, actual: str) -> ShapeError:
         # Written only when it is raised: torch.compile cannot format sizes that it holds as symbols.
         return ShapeError("vertices", f"a floating tensor (*batch, {self.num_vertices}, 3)", actual)

@@ -12,7 +12,7 @@ from .arguments import positive_count
 from .errors import CommandError
 from .exit_codes import EXIT_NOT_REACHED, EXIT_OK, IN_WORDS
 from .inputs import add_repair, read_input
-from .mesh_planar import PlanarMesh, made_planar
+from .mesh_planar import made_planar
 from .options import SettingOptions
 from .outputs import Outputs, Request, Writer
 from .parser import CommandParser
@@ -20,7 +20,7 @@ from .parser import CommandParser
 if TYPE_CHECKING:
     from ..meshing import MeshingSettings, QuadMesh, TriangleMesh
 
-    Made = QuadMesh | TriangleMesh | PlanarMesh
+    Made = QuadMesh | TriangleMesh
 
 NAME = "torchfair mesh"
 _DESCRIPTION = (

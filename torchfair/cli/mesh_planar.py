@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -14,19 +14,7 @@ if TYPE_CHECKING:
 _DISTANCE = 0.03  # mean edges from the surface
 
 
-@dataclass(frozen=True, eq=False)
-class PlanarMesh:
-    """What came of a principal mesh: as :class:`torchfair.meshing.QuadMesh`."""
-
-    vertices: Tensor
-    topology: Topology
-    singular_points: Tensor
-    singular_indices: Tensor
-    report: dict[str, Any]
-    notes: list[str]
-
-
-def made_planar(mesh: QuadMesh, surface: tuple[Tensor, Topology]) -> tuple[PlanarMesh, list[str]]:
+def made_planar(mesh: QuadMesh, surface: tuple[Tensor, Topology]) -> tuple[QuadMesh, list[str]]:
     """The mesh with planar polygons near the surface, and what was not reached.
 
     Its report is that of the mesh before, under ``before_planar``, and that of the result.
@@ -44,5 +32,4 @@ def made_planar(mesh: QuadMesh, surface: tuple[Tensor, Topology]) -> tuple[Plana
     report = {**measure_mesh_on(result.vertices, mesh, surface), "before_planar": mesh.report}
     missed = [str(promise) for promise in result.promises if not promise.holds]
     notes = [*mesh.notes, *result.notes]
-    planar = PlanarMesh(result.vertices, mesh.topology, mesh.singular_points, mesh.singular_indices, report, notes)
-    return planar, missed
+    return replace(mesh, vertices=result.vertices, report=report, notes=notes), missed

@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..errors import MeshError
 from ..geometry import vertex_normals
+from ..geometry._ops import cross, unit
 from ..projection import ElementTerm
 from ..topology import Topology
 from .base import Constraint
@@ -36,15 +36,13 @@ def edge_direction_terms(
     Raises:
         MeshError: an edge number is out of range.
     """
-    wrong = edges[(edges < 0) | (edges >= topology.num_interior_edges)]
-    if wrong.numel():
-        raise MeshError(f"interior edges are numbered 0 to {topology.num_interior_edges - 1}, got {wrong[:5].tolist()}")
+    topology.check_interior_edges(edges)
     if not edges.numel():
         return []
     ends = topology.interior_edges[edges]
     along = vertices[ends[:, 1]] - vertices[ends[:, 0]]
     normals = vertex_normals(vertices, topology)[ends].sum(1)
-    across = torch.nn.functional.normalize(torch.linalg.cross(normals, along), dim=1)
+    across = unit(cross(normals, along))
     return [ElementTerm("edge directions", sideways, [(block, ends)], data=(across,), weight=weight, linear=True)]
 
 

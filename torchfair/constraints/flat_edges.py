@@ -5,7 +5,6 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..errors import MeshError
 from ..projection import ElementTerm
 from ..topology import Topology
 from .base import Constraint
@@ -28,9 +27,7 @@ def flat_edge_terms(topology: Topology, edges: Tensor, *, weight: float, block: 
     Raises:
         MeshError: an edge number is out of range.
     """
-    wrong = edges[(edges < 0) | (edges >= topology.num_interior_edges)]
-    if wrong.numel():
-        raise MeshError(f"interior edges are numbered 0 to {topology.num_interior_edges - 1}, got {wrong[:5].tolist()}")
+    topology.check_interior_edges(edges)
     chosen = edge_keys(topology.interior_edges[edges], topology)
     terms = []
     for (left, _), stencil in edge_stencils(topology).items():

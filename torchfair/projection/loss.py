@@ -50,7 +50,17 @@ class Squares:
 
 
 @dataclass(frozen=True)
-class SmoothAbsolute:
+class Rounded:
+    """What losses share that are rounded within ``epsilon`` of zero, which is a finite number above 0."""
+
+    epsilon: float
+
+    def __post_init__(self) -> None:
+        check_number(f"epsilon of {type(self).__name__}", self.epsilon, above=True, finite=True)
+
+
+@dataclass(frozen=True)
+class SmoothAbsolute(Rounded):
     r"""Smoothed norm ``sqrt(|r|^2 + epsilon^2) - epsilon``; tends to ``|r|`` as epsilon goes to zero.
 
     The quadratic model with weight ``1 / sqrt(|r_prev|^2 + epsilon^2)`` lies above the smoothed norm and
@@ -64,11 +74,6 @@ class SmoothAbsolute:
         SettingsError: epsilon is not a finite number above 0.
     """
 
-    epsilon: float
-
-    def __post_init__(self) -> None:
-        check_number("epsilon of SmoothAbsolute", self.epsilon, above=True, finite=True)
-
     def value(self, residuals: Tensor) -> Tensor:
         """``sqrt(|r|^2 + epsilon^2) - epsilon``, evaluated without cancellation."""
         squared = residuals.square().sum(1)
@@ -80,7 +85,7 @@ class SmoothAbsolute:
 
 
 @dataclass(frozen=True)
-class LogAbsolute:
+class LogAbsolute(Rounded):
     r"""The absolute value as the paper reweights it: ``|r| - epsilon log(1 + |r| / epsilon)``.
 
     Its quadratic model is that of paper section 5.3, ``r^2 / (|r_prev| + epsilon)``, half of it. Iterated reweighting
@@ -93,11 +98,6 @@ class LogAbsolute:
     Raises:
         SettingsError: epsilon is not a finite number above 0.
     """
-
-    epsilon: float
-
-    def __post_init__(self) -> None:
-        check_number("epsilon of LogAbsolute", self.epsilon, above=True, finite=True)
 
     def value(self, residuals: Tensor) -> Tensor:
         """``|r| - epsilon log(1 + |r| / epsilon)``, never below zero."""

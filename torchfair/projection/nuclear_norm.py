@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from .._numbers import check_number
 from ..errors import ShapeError
+from .loss import Rounded
 
 _TWICE = math.sqrt(2.0)  # factor of components beside the diagonal, which stand for two entries
 
 
 @dataclass(frozen=True)
-class SmoothNuclearNorm:
+class SmoothNuclearNorm(Rounded):
     r"""Smoothed nuclear norm ``sum_i sqrt(k_i^2 + epsilon^2) - epsilon`` of a symmetric 3x3 matrix.
 
     The residual of an element is the matrix ``W`` as its six :func:`symmetric_components`; ``k_i`` are its
@@ -29,11 +29,6 @@ class SmoothNuclearNorm:
     Raises:
         SettingsError: epsilon is not a finite number above 0.
     """
-
-    epsilon: float
-
-    def __post_init__(self) -> None:
-        check_number("epsilon of SmoothNuclearNorm", self.epsilon, above=True, finite=True)
 
     def value(self, residuals: Tensor) -> Tensor:
         """Smoothed nuclear norms (n,), evaluated without cancellation; ShapeError unless residuals are ``(n, 6)``."""

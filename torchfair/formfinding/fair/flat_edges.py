@@ -9,7 +9,6 @@ from torch import Tensor
 
 from ..._graph import connected, face_components
 from ...constraints.normal_variation import edge_stencils
-from ...errors import MeshError
 from ...geometry import corner_angles, dihedral_angles
 from ...geometry._ops import angle_of, cross, dot, norm
 from ...topology import Topology
@@ -29,8 +28,7 @@ def edges_to_keep_flat(vertices: Tensor, topology: Topology, settings: FairSetti
     chosen, count = settings.flat, topology.num_interior_edges
     if not isinstance(chosen, str):
         edges = torch.tensor(chosen, dtype=torch.int64)
-        if edges.numel() and not bool(((edges >= 0) & (edges < count)).all()):
-            raise MeshError(f"flat: interior edges are numbered 0 to {count - 1}, got {list(chosen)[:5]}")
+        topology.check_interior_edges(edges, "flat: ")
         return edges
     if chosen == "none":
         return torch.zeros(0, dtype=torch.int64)
