@@ -128,7 +128,7 @@ def test_the_distance_limit_is_in_mean_edges_of_the_input() -> None:
     finer = recipe.refined(recipe.state())
     ratio = recipe.unit.length / finer.unit.length
     assert 1.8 < ratio < 2.2
-    assert finer.problem.distance_limit == pytest.approx(0.08 * ratio)
+    assert finer.problem.near.limit == pytest.approx(0.08 * ratio)
     assert finer.input_edge == recipe.unit.length
     measured = finer.measures(finer.given)
     assert measured["largest_distance_relative"] == pytest.approx(measured["largest_distance"] / recipe.unit.length)

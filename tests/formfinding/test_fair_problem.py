@@ -72,7 +72,7 @@ def test_no_face_turns_over_whatever_is_asked_for() -> None:
     assert not asked.admits(start, beyond)
     assert not asked.admits(beyond, beyond)
     design = problem(targets={12: beyond["vertices"][12] + torch.tensor([0.0, 0.0, 3.0], dtype=DOUBLE)})
-    assert design.design_mode
+    assert design.near.design_mode
     assert not design.admits(start, beyond)
     assert design.admits(beyond, beyond)  # far from the start only the last state says what is front
 
@@ -82,11 +82,11 @@ def test_one_handle_that_leaves_the_surface_is_enough_for_design_mode() -> None:
     vertices, _ = bent_sheet()
     along, away = torch.tensor([0.0, 0.3, 0.0], dtype=DOUBLE), torch.tensor([0.0, 0.0, 0.7], dtype=DOUBLE)
     on, off = {11: vertices[11] + along}, {13: vertices[13] + away}
-    assert not problem(targets=on).design_mode
-    assert problem(targets=off).design_mode
-    assert problem(targets={**on, **off}).design_mode
-    assert not problem(targets=off, settings=FairSettings(distance_limit=None)).design_mode
-    assert not problem(targets=off, settings=FairSettings(distance_limit=1.0)).design_mode
+    assert not problem(targets=on).near.design_mode
+    assert problem(targets=off).near.design_mode
+    assert problem(targets={**on, **off}).near.design_mode
+    assert not problem(targets=off, settings=FairSettings(distance_limit=None)).near.design_mode
+    assert not problem(targets=off, settings=FairSettings(distance_limit=1.0)).near.design_mode
 
 
 def test_auxiliary_variables_fit_their_constraints_at_every_start_of_a_stage() -> None:

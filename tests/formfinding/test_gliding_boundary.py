@@ -83,16 +83,16 @@ def test_the_distance_of_a_gliding_vertex_is_that_from_the_nearer_of_curve_and_s
     vertices, topology = dome()
     fair, rim = problem(vertices, topology), topology.is_boundary_vertex
     lifted = vertices + torch.tensor([0.0, 0.0, 0.01], dtype=DOUBLE)
-    surface = fair.reference.closest(lifted).distances
+    surface = fair.near.surface.closest(lifted).distances
     curve = rim_distances(vertices, topology, lifted)
     loop = topology.boundary_loops()[0]
-    distances = fair.distances(lifted)
+    distances = fair.near.distances(lifted)
     torch.testing.assert_close(distances[~rim], surface[~rim], rtol=0, atol=1e-15)
     torch.testing.assert_close(distances[loop], torch.minimum(surface[loop], curve), rtol=0, atol=1e-15)
     assert bool((surface[loop] < curve).any())
     outside = vertices * torch.tensor([1.2, 1.2, 1.0], dtype=DOUBLE)
     torch.testing.assert_close(
-        fair.distances(outside)[loop], rim_distances(vertices, topology, outside), rtol=0, atol=1e-15
+        fair.near.distances(outside)[loop], rim_distances(vertices, topology, outside), rtol=0, atol=1e-15
     )
 
 

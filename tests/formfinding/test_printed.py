@@ -88,7 +88,7 @@ def test_fair_lowers_half_the_papers_functional() -> None:
     expected = constraints_of_the_energy(state, topology)
     expected += W_FAIR * float(polyline_fairness(x, topology, triples))
     expected += W_TARGET * float((s[:, 2] ** 2 * s[:, 3] ** 2).sum())
-    expected += W_PROX * float(recipe.problem.reference.closest(x).distances.square().sum())
+    expected += W_PROX * float(recipe.problem.near.surface.closest(x).distances.square().sum())
     expected += W_HANDLE * float((x[7] - recipe.pulls.targets[7]).square().sum())
     assert merit(list(stage.terms()), state) == pytest.approx(0.5 * expected, rel=1e-9)
     assert stage.settings.initial_damping == W_REG

@@ -176,23 +176,23 @@ def test_weights_act_on_the_running_solve() -> None:
 def test_a_mesh_that_a_handle_has_pulled_off_the_reference_comes_back_to_it(back: str) -> None:
     session = opened()
     drag(session, 8)
-    problem = session.recipe.problem
-    assert problem.design_mode
+    near = session.recipe.problem.near
+    assert near.design_mode
     if back == "let go":
         session.free([MIDDLE])
     else:
         session.move({MIDDLE: above(session, 0.0)})
-    far = [float(problem.distances(session.state["vertices"]).max())]
+    far = [float(near.distances(session.state["vertices"]).max())]
     for _ in range(20):
         if not session.step().accepted:
             break
-        far.append(float(problem.distances(session.state["vertices"]).max()))
-    assert not problem.design_mode
+        far.append(float(near.distances(session.state["vertices"]).max()))
+    assert not near.design_mode
     session.settle()
-    limit = float(problem.limits.max())
+    limit = float(near.limits.max())
     assert far[0] > 0.5 > limit
     assert all(after <= max(before, limit) * (1.0 + 1e-6) for before, after in itertools.pairwise(far[1:]))
-    assert float(problem.distances(session.state["vertices"]).max()) <= limit
+    assert float(near.distances(session.state["vertices"]).max()) <= limit
 
 
 def test_the_way_back_to_the_reference_is_in_snapshots() -> None:

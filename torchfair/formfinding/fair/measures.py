@@ -38,8 +38,8 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
     """
     topology = problem.topology
     normalised = unit.apply(vertices)
-    distances = problem.distances(normalised)[topology.valences > 0]
-    back = ReferenceSurface(normalised, topology).closest(problem.reference_points).distances
+    distances = problem.near.distances(normalised)[topology.valences > 0]
+    back = ReferenceSurface(normalised, topology).closest(problem.near.points).distances
     ratios = face_areas(vertices, topology) / face_areas(start, topology)
     turned = (face_normals(vertices, topology) * face_normals(start, topology)).sum(1)
     strayed = vertices.new_zeros(0) if problem.boundary is None else problem.boundary.distances(normalised)
@@ -76,7 +76,7 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
     promises = []
     if not problem.has_other_goals:
         promises.append(Promise("E", before["normal_variation"], after["normal_variation"]))
-    if problem.limits is not None and not problem.design_mode:
+    if problem.near.limits is not None and not problem.near.design_mode:
         most = max(settings.distance_limit or 0.0, before["largest_distance_relative"])
         reached = after["largest_distance_relative"]
         remedy = "raise distance_limit, or pull less"
@@ -87,7 +87,7 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         promises.append(Promise("smallest angle", least, reached, "at least", "degrees"))
         area = after["smallest_area_ratio"]
         promises.append(Promise("smallest area against its own", settings.smallest_area, area, "at least"))
-    if not problem.design_mode:
+    if not problem.near.design_mode:
         promises.append(Promise("faces turned over", 0.0, after["flipped_faces"]))
     if problem.planar_faces.numel() and settings.planarity_weight:
         remedy = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"

@@ -12,19 +12,19 @@ from torch import Tensor
 
 from ... import constraints as c
 from ...boundary import boundary_corners
-from ...geometry import closest_on, corner_angles, dihedral_angles, face_areas, face_centres
+from ...geometry import corner_angles, dihedral_angles, face_areas
 from ...geometry.planarity import planarity
-from ...geometry.reference import Reference
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...topology import Topology
 from ..job.plan import Stage
 from ..job.pulls import Pulls
-from ..references import GivenReference, distances_from, surface_of
+from ..references import GivenReference
 from .boundary_curves import BoundaryCurves
 from .flat_edges import edges_to_keep_flat
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
+from .nearness import Nearness
 from .planar_faces import faces_to_keep_planar
 from .settings import FairSettings
 
@@ -37,8 +37,6 @@ _PLANAR_ENOUGH = 5e-5
 _LARGEST_FOLD = math.radians(2.0)  # of edges kept flat, above which that is imposed in stages
 _FLAT_ENOUGH = math.radians(0.01)
 _MOST_STAGES = 20
-_NO_LIMIT = 1e9  # mean edge lengths
-_ROUNDING = 1.0 + 1e-9  # of distances at the start
 
 
 class FairProblem:
@@ -54,14 +52,9 @@ class FairProblem:
         input_edge: Mean edge length of the input, in which the distance limit is given; that of the start is 1.
 
     Attributes:
-        reference: As a surface with closest points.
-        reference_points: (n, 3) points on it: its vertices; of a function those nearest to the vertices and to the
-            centres of the faces of the start.
+        near: Closeness to the reference surface.
         input_edge: Mean edge length of the input.
-        limits: (V,) largest distances from it; None for no limit.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
-        allowed: (V,) the same as they are now: none in design mode, more than ``limits`` on the way back from it.
-        design_mode: Whether a handle is pulled off the reference surface, which is then given up.
         planar_faces: (n,) faces that are kept planar.
         flat_edges: (n,) interior edges that are kept flat.
         boundary: Curves on which boundary vertices glide; None if they do not.
@@ -81,50 +74,39 @@ class FairProblem:
     ) -> None:
         self.vertices, self.topology, self.pulls, self.settings = vertices, topology, pulls, settings
         self.notes: list[str] = []
-        self.reference, self.reference_points = self._reference(reference or (vertices, topology))
-        self._has_other_reference = reference is not None
-        self.forget()
-        self.design_mode = self.has_other_goals = False
+        self._has_other_reference, self.has_other_goals = reference is not None, False
         self.input_edge, self._rim = input_edge, rim or boundary_curves(vertices, topology, settings)
         self.corners = self._rim.corners
         self.planar_faces = self._planar_faces()
         self.flat_edges = self._flat_edges()
         self.boundary = self._gliding_boundary()
-        self.limits = self.allowed = self._limits()
+        limit = settings.distance_limit
+        self.near = Nearness(
+            vertices,
+            topology,
+            reference or (vertices, topology),
+            pulls,
+            self.boundary,
+            limit=None if limit is None else limit * input_edge,
+            input_edge=input_edge,
+            notes=self.notes,
+        )
 
     def reconsider(self) -> None:
         """Takes in that handles are pulled elsewhere."""
-        before, self.design_mode = self.design_mode, self._leaves_reference()
-        if self.design_mode and self.limits is not None:
-            self.allowed = torch.full_like(self.limits, _NO_LIMIT)
+        self.near.reconsider()
         self.has_other_goals = bool(self.pulls.pulled.any()) or self._has_other_reference
-        self.pulls.version += before != self.design_mode
         self.__dict__.pop("guard", None)
-
-    def take_up_reference(self, vertices: Tensor) -> None:
-        """Lifts limits to where handles have left the ``vertices`` (V, 3), once these are let go or on it again.
-
-        Closeness then brings them back, and none may go farther away.
-        """
-        if self.design_mode or self.limits is None or self.allowed is None or self.allowed is self.limits:
-            return
-        lifted = torch.maximum(self.limits, self.distances(vertices) * _ROUNDING).minimum(self.allowed)
-        self.allowed = lifted if bool((lifted > self.limits).any()) else self.limits
-        self.pulls.version += 1
 
     def snapshot(self) -> Callable[[], None]:
         """A function that puts back what handles have changed."""
-        design_mode, allowed = self.design_mode, self.allowed
+        put_back_near = self.near.snapshot()
 
         def put_back() -> None:
-            self.design_mode, self.allowed = design_mode, allowed
+            put_back_near()
             self.__dict__.pop("guard", None)
 
         return put_back
-
-    def forget(self) -> None:
-        """Makes searches for closest points anew."""
-        self._planes = c.TangentPlanes(self.reference)
 
     # ---- stages ----------------------------------------------------------------------------------------
 
@@ -167,7 +149,7 @@ class FairProblem:
         settings = self.settings
         return [
             *self._energy(blur),
-            *self._closeness(),
+            *self.near.terms(weight=settings.closeness_weight, barrier_weight=settings.quality_weight),
             *self._boundary(),
             *self._fairness(),
             *self._quality(),
@@ -197,33 +179,7 @@ class FairProblem:
             return {"vertices": vertices}
         return {"vertices": vertices, **c.lifted_normal_variation_blocks(vertices, self.topology)}
 
-    @property
-    def distance_limit(self) -> float | None:
-        """Normalised."""
-        limit = self.settings.distance_limit
-        return None if limit is None else limit * self.input_edge
-
     # ---- decisions -------------------------------------------------------------------------------------
-
-    def _reference(self, reference: GivenReference) -> tuple[Reference, Tensor]:
-        surface = surface_of(reference)
-        if isinstance(reference, tuple):
-            return surface, reference[0][reference[1].valences > 0]
-        used = self.vertices[self.topology.valences > 0]
-        places = torch.cat([used, face_centres(self.vertices, self.topology)])
-        return surface, closest_on(surface)(places)[0]
-
-    def _leaves_reference(self) -> bool:
-        limit, handles = self.distance_limit, self.pulls.vertices
-        if not handles.numel() or limit is None:
-            return False
-        farthest = float(distances_from(self.reference, self.pulls.targets[handles]).max())
-        if farthest > limit and not self.design_mode:
-            self.notes.append(
-                f"a handle pulls {farthest / self.input_edge:.3g} mean edge lengths off the reference surface: "
-                "closeness and the distance limit are switched off (design mode)"
-            )
-        return farthest > limit
 
     def stays(self) -> Tensor:
         """(V,) bool, vertices that do not move: the boundary or its corners, unless they are pulled; isolated ones."""
@@ -277,49 +233,6 @@ class FairProblem:
             return []
         every = torch.arange(self.topology.num_interior_edges)
         return c.edge_direction_terms(self.vertices, self.topology, every, weight=self.settings.direction_weight)
-
-    def _closeness(self) -> list[ElementTerm]:
-        settings, used = self.settings, self.topology.valences > 0
-        if self.design_mode and not self.pulls.everywhere:
-            return []
-        close = used if self.boundary is None else used & ~(self.boundary.held & ~self.pulls.pulled)
-        chosen = torch.nonzero(used if self.pulls.everywhere else close).squeeze(1)
-        (term,) = c.closeness_terms(self._surface, chosen, weight=settings.closeness_weight)
-        if self.pulls.everywhere:
-            weights = torch.zeros_like(close) if self.design_mode else close
-            term = replace(term, element_weights=weights[chosen].to(self.vertices))
-        if self.allowed is None:
-            return [term]
-        return [term, *c.distance_limit_terms(self._surface_or_curve, self.allowed, weight=settings.quality_weight)]
-
-    def _limits(self) -> Tensor | None:
-        """(V,) largest distances from the reference that are allowed; isolated vertices have no limit."""
-        limit, used = self.distance_limit, self.topology.valences > 0
-        if limit is None:
-            return None
-        distances = self.distances(self.vertices)
-        far = int((distances > limit)[used].sum())
-        if far:
-            self.notes.append(f"{far} vertices start farther from the reference surface than the distance limit")
-        return torch.where(used, distances.clamp_min(limit) * _ROUNDING, _NO_LIMIT)
-
-    def _surface(self, state: State) -> tuple[Tensor, Tensor]:
-        """Closest points on the surface and normals there; where it is given up, nothing that costs."""
-        return (state["vertices"], self.vertices) if self.design_mode else self._planes(state)
-
-    def _surface_or_curve(self, state: State) -> tuple[Tensor, Tensor]:
-        return (state["vertices"], self.vertices) if self.design_mode else self._nearest(state)
-
-    def _nearest(self, state: State) -> tuple[Tensor, Tensor]:
-        """Planes from which distances are measured: of gliding vertices from the surface or from their curve."""
-        planes = self._planes(state)
-        return planes if self.boundary is None else self.boundary.nearest(state, *planes)
-
-    def distances(self, vertices: Tensor) -> Tensor:
-        """(V,) distances from the reference surface or, where a vertex glides on a curve that is nearer, from that."""
-        positions, _ = self._nearest({"vertices": vertices})
-        distances: Tensor = torch.linalg.vector_norm(vertices - positions, dim=1)
-        return distances
 
     def _gliding_boundary(self) -> GlidingBoundary | None:
         if self.settings.boundary != "glide":
@@ -375,7 +288,7 @@ class FairProblem:
         where handles have been.
         """
         kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
-        rises = self.has_other_goals or self.allowed is not self.limits
+        rises = self.has_other_goals or self.near.is_on_the_way_back
         return kept and (rises or self.guard.keeps_energy(state, trial))
 
     @cached_property
@@ -388,7 +301,7 @@ class FairProblem:
             self.placed,
             smallest_angle=bounded * self._smallest_angle,
             smallest_area=bounded * self.settings.smallest_area,
-            from_last=self.design_mode or self.pulls.everywhere,
+            from_last=self.near.design_mode or self.pulls.everywhere,
         )
 
 

@@ -79,12 +79,12 @@ class FairRecipe(Recipe[FairSettings]):
 
     def plan(self, state: State) -> FairPlan:
         """Constraints in portions, then the absolute value sharper and sharper."""
-        self.problem.take_up_reference(self.placed(state))
+        self.problem.near.take_up(self.placed(state))
         return FairPlan(self.problem, state)
 
     def follower(self, state: State) -> Stage:
         """Everything at once, with the sharp absolute value; longer steps would carry handles past their targets."""
-        self.problem.take_up_reference(self.placed(state))
+        self.problem.near.take_up(self.placed(state))
         settings = replace(self.settings.projection, least_extrapolation=math.inf, least_uncorrected_gain=0.0)
         return self.problem.stage(state, 1.0, 1.0, settings)
 
@@ -106,7 +106,7 @@ class FairRecipe(Recipe[FairSettings]):
 
     def forget(self) -> None:
         """Searches for closest points begin anew."""
-        self.problem.forget()
+        self.problem.near.forget()
 
     def measures(self, vertices: Tensor) -> dict[str, float]:
         """See ``fair_measures``."""
