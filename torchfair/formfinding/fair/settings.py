@@ -64,8 +64,9 @@ class FairSettings:
             more edges are flat than by chance.
         flat_tolerance: An edge arrives flat when its angle is at most this fraction of the mean angle of all edges.
         flat_weight: Weight of half of squared ``l l*`` of edges kept flat; where they are not flat enough it is raised.
-        directions: ``"keep"`` holds edges to their directions within the surface, such as those of a mesh along principal
-            directions whose faces become planar: by a weight, which promises no bound; ``"free"`` lets E turn them.
+        directions: ``"keep"`` holds edges to their directions within the surface, such as those of a mesh along
+            principal directions whose faces become planar: by a weight, which promises no bound; ``"free"`` lets E
+            turn them.
         direction_weight: Weight of half the squared sideways components of edges that keep their directions.
         smallest_angle: No corner angle falls below this (or below the smallest of the input), radians.
         smallest_area: No face falls below this fraction of its area.
