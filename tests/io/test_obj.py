@@ -133,7 +133,7 @@ FAULTS = [
     (SQUARE, None, "the mesh has no faces"),
     ("f 1 2 3\n", None, "the mesh has no vertices"),
     ("# nothing\n", None, "no vertices"),
-    (SQUARE + "f 1 2 3 3\n", None, "more than once: faces 0"),
+    (SQUARE + "f 1 2 3 3\n", 5, r"more than once: faces 1 \(line 5\)\. .*repair=True.* mends this"),
     (b"v 0 0 0\nv \x00", 2, "binary data"),
     ("v 0 0 0\n".encode("utf-16"), None, "UTF-16"),
     (b"v 0 0 \xff\n", 1, "expected a number"),

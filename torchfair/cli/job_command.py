@@ -11,6 +11,7 @@ from .exit_codes import EXIT_INTERRUPTED, EXIT_NOT_REACHED, EXIT_OK, IN_WORDS
 from .options import SettingOptions
 from .outputs import Outputs, Request, Writer
 from .parser import CommandParser
+from .reading import in_numbers_of, said_of
 from .summary import kept_lines, measures_table, missed_lines, note_lines, work_lines
 
 if TYPE_CHECKING:
@@ -100,11 +101,12 @@ class JobCommand(ABC):
         request = self.read(arguments, settings)
         settings = request.settings or settings
         outputs.make_folders()
-        result = self._solve(request, settings)
+        with in_numbers_of(request.mesh):
+            result = self._solve(request, settings)
         outputs.write_mesh(request, result)
         missed = missed_lines(result, getattr(arguments, "levels", 0))
         lines = [
-            *(f"repaired: {sentence}" for sentence in request.mesh.repairs),
+            *said_of(request.mesh),
             *note_lines([*request.notes, *result.notes], missed),
             *measures_table(result.before, result.after),
             *kept_lines(result),
@@ -128,7 +130,12 @@ class JobCommand(ABC):
         from ..formfinding import job_report
 
         asked = {name: value for name, value in vars(arguments).items() if name not in _NOT_ASKED and "." not in name}
-        own = {"job": self.job, "request": asked, **request.report}
+        read = {
+            "repairs": request.mesh.repairs,
+            "input_notes": request.mesh.notes,
+            "vertex_map": request.mesh.vertex_map,
+        }
+        own = {"job": self.job, "request": asked, **read, **request.report}
         return {**own, **job_report(result, settings)}
 
     def _exit_code(self, result: JobResult[Any], missed: Sequence[str]) -> int:

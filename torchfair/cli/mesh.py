@@ -16,6 +16,7 @@ from .mesh_planar import made_planar
 from .options import SettingOptions
 from .outputs import Outputs, Request, Writer
 from .parser import CommandParser
+from .reading import in_numbers_of, said_of
 
 if TYPE_CHECKING:
     from ..meshing import MeshingSettings, QuadMesh, TriangleMesh
@@ -88,13 +89,14 @@ def run(arguments: argparse.Namespace) -> int:
     settings = options().settings(arguments)
     outputs = MeshOutputs(arguments, {"mesh.png": _singular, "edges.png": _edges})
     outputs.prepare()
-    surface = read_input(arguments.input, arguments.repair)
+    surface = read_input(arguments.input, arguments)
     outputs.make_folders()
     began = time.perf_counter()
-    made, missed = _made(surface.vertices, surface.topology, arguments, settings)
+    with in_numbers_of(surface):
+        made, missed = _made(surface.vertices, surface.topology, arguments, settings)
     request = Request(surface, {})
     outputs.write_mesh(request, made)
-    lines = [*(f"repaired: {sentence}" for sentence in surface.repairs), *(f"note: {note}" for note in made.notes)]
+    lines = [*said_of(surface), *(f"note: {note}" for note in [*made.notes, *request.notes])]
     print("\n".join([*lines, *_table(made.report)]), flush=True)
     outputs.write_others(_report(arguments, made, settings, missed, time.perf_counter() - began), request, made)
     print("\n".join([*(f"wrote {path}" for path in outputs.paths()), *missed]))

@@ -14,8 +14,12 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from ..io import PolygonMesh
+    from ..topology import Topology
 
-_MESH_FORMATS = (".obj", ".off", ".ply")
+_MESH_FORMATS = (".obj", ".off", ".ply", ".stl", ".glb")
+
+
+_TRIANGLES = (".stl", ".glb")
 
 
 @dataclass
@@ -84,10 +88,11 @@ class Outputs:
 
     def write_mesh(self, request: Request, result: Any) -> None:
         """Writes what must not be lost."""
-        from ..io import save_mesh
-
         lines = self.polylines(result)
-        save_mesh(self.mesh, result.vertices, result.topology, overwrite=self.force, polylines=lines)
+        request.notes += save_result(
+            self.mesh, result.vertices, result.topology, request.mesh, force=self.force, polylines=lines,
+            marks=bool(len(lines) or self.beside),
+        )  # fmt: skip
         self._write(self.beside, request, result)
 
     def polylines(self, result: Any) -> Sequence[Tensor]:
@@ -104,6 +109,49 @@ class Outputs:
     def _write(self, files: Mapping[Path, Writer], request: Request, result: Any) -> None:
         for path, writer in files.items():
             writer(path, request, result, self.force)
+
+
+def save_result(
+    path: Path,
+    vertices: Tensor,
+    topology: Topology,
+    source: PolygonMesh,
+    *,
+    force: bool,
+    polylines: Sequence[Tensor] = (),
+    marks: bool = False,
+) -> list[str]:
+    """Writes a mesh that was made from another one, and says what of the file of that it does not hold.
+
+    Groups, materials, texture coordinates and colours of an OBJ file are written back where the faces are the same;
+    polygons are cut into triangles where the format has no others.
+
+    Args:
+        path: The file.
+        vertices: (V, 3) of the mesh.
+        topology: Of the mesh.
+        source: What it was made from.
+        force: Whether a file may be replaced.
+        polylines: Line elements of an OBJ file.
+        marks: Whether line elements of the source are carried on.
+    """
+    from ..io import save_mesh
+
+    suffix, notes = path.suffix.lower(), []
+    attributes = source.attributes
+    same = topology.corners.equal(source.topology.corners) and topology.face_offsets.equal(source.topology.face_offsets)
+    if attributes is not None:
+        left_out = attributes.left_out(suffix, same, marks)
+        notes += [f"{path.name} does not hold {left_out} of the input"] if left_out else []
+    if suffix in _TRIANGLES and not topology.is_triangular:
+        from ..topology import Topology
+        from ..triangulation import triangulate
+
+        notes.append(f"{path.name} holds its polygons cut into triangles: {suffix} files have no others")
+        topology = Topology.from_faces(triangulate(vertices, topology).triangles, topology.num_vertices)
+    kept = attributes if suffix == ".obj" and same else None
+    save_mesh(path, vertices, topology, overwrite=force, polylines=polylines, attributes=kept)
+    return notes
 
 
 def refuse_unknown_format(path: Path) -> None:

@@ -16,6 +16,7 @@ from ..topology import Topology
 from . import others
 from .atomic import atomic_write_bytes
 from .obj import write_obj
+from .obj_attributes import ObjAttributes
 from .off import write_off
 from .ply import Bytes, write_ply
 from .raw_mesh import Ints, RawMesh
@@ -30,6 +31,7 @@ def save_mesh(
     binary: bool = False,
     polylines: Sequence[Tensor] = (),
     colors: Tensor | None = None,
+    attributes: ObjAttributes | None = None,
 ) -> None:
     """Writes a polygon mesh; the file appears whole or not at all.
 
@@ -46,6 +48,8 @@ def save_mesh(
         binary: whether to write PLY in (little-endian) binary.
         polylines: OBJ files only: vertex numbers, two or more each, that are written as line elements, such as from
             ``PrincipalEdges.polylines``; :func:`load_edge_labels` reads the edges back.
+        attributes: OBJ files only: groups, materials, texture coordinates and colours of the mesh as it was read
+            (:attr:`PolygonMesh.attributes`), which are written back; the mesh must have the same faces.
         colors: PLY files only: (V, 3) red, green and blue of every vertex, 0 to 1.
 
     Raises:
@@ -65,9 +69,14 @@ def save_mesh(
         raise MeshFileError(path, "only OBJ files hold polylines. Use save_edge_labels beside files of other formats")
     if colors is not None and suffix != ".ply":
         raise MeshFileError(path, "only PLY files hold colours here. Leave out colors")
+    if attributes is not None and suffix != ".obj":
+        raise MeshFileError(path, "only OBJ files hold attributes here. Leave out attributes")
     mesh = _raw_mesh(vertices, topology)
     if suffix == ".obj":
-        data = write_obj(mesh, [_line_points(line, topology) for line in polylines])
+        if attributes is not None:
+            _check_fit(mesh, attributes)
+        lines = [_line_points(line, topology) for line in polylines]
+        data = write_obj(mesh, lines, attributes, path.parent)
     elif suffix == ".off":
         data = write_off(mesh)
     elif suffix == ".ply":
@@ -91,6 +100,14 @@ def _raw_mesh(vertices: Tensor, topology: Topology) -> RawMesh:
             "Nothing was written."
         )
     return RawMesh(points, topology.corners.cpu().numpy(), topology.face_offsets.cpu().numpy())
+
+
+def _check_fit(mesh: RawMesh, attributes: ObjAttributes) -> None:
+    fits = len(attributes.behind) in (0, len(mesh.points))
+    fits = fits and attributes.corner_textures.size in (0, len(mesh.corners))
+    fits = fits and all(place < len(mesh.offsets) for place, _ in attributes.statements)
+    if not fits:
+        raise MeshError("attributes: they are those of a mesh with other vertices or faces. Leave them out")
 
 
 def _bytes(colors: Tensor, topology: Topology) -> Bytes:
