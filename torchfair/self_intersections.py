@@ -11,6 +11,7 @@ from torch import Tensor
 
 from ._exact_triangles import meet_exactly
 from ._one_mesh import one_mesh
+from ._ranges import ranges
 from .topology import Topology
 from .triangulation import triangulate
 
@@ -82,10 +83,8 @@ def _near_pairs(p: Floats) -> Iterator[Ints]:
     while start < len(p):
         before = total[start - 1] if start else 0
         stop = max(start + 1, int(np.searchsorted(total, before + _MOST_PAIRS)))
-        first = np.repeat(np.arange(start, stop), counts[start:stop])
-        own = counts[start:stop]
-        offset = np.arange(len(first)) - np.repeat(np.cumsum(own) - own, own)
-        second = first + 1 + offset
+        here, own = np.arange(start, stop), counts[start:stop]
+        first, second = np.repeat(here, own), ranges(here + 1, own)
         for other in others:
             close = (low[first, other] <= high[second, other]) & (low[second, other] <= high[first, other])
             first, second = first[close], second[close]
