@@ -26,10 +26,11 @@ _MOST_PAIRS = 4_000_000  # of boxes that are looked at together
 def self_intersections(vertices: Tensor, topology: Topology) -> Tensor:
     """Pairs of faces that meet where they should not.
 
-    Faces without a common vertex meet if they have a point in common, touching included; faces with one common vertex,
-    if they meet anywhere else. Faces with a common edge are not looked at: what they can do, fold back onto each other,
-    is a dihedral angle of 180 degrees. Polygons are seen as triangles, cut as by
-    ``triangulation.triangulate``.
+    Triangles without a common vertex meet if they have a point in common, touching included; triangles with one common
+    vertex, if they meet anywhere else. Triangles with a common edge are not looked at: what they can do, fold back onto
+    each other, is a dihedral angle of 180 degrees. Polygons are cut into triangles as by
+    ``triangulation.triangulate``, and two of them meet if triangles of theirs do; the triangles of one polygon are not
+    compared.
 
     Pairs of bounding boxes come from a sweep. Triangles are told apart, or not, by their projections onto all axes that
     can separate them; where that is a matter of rounding, rational arithmetic decides. So the answer is exact for the
