@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 FLOORS = (
     {"errors", "_interrupts", "_shown", "_threads"},
-    {"_half_edges", "_numbers", "cameras", "linear", "progress", "rasterisation"},
+    {"_half_edges", "_numbers", "_ranges", "cameras", "linear", "progress", "rasterisation"},
     {"settings"},
     {"_connectivity", "projection"},
     {"topology"},
