@@ -17,10 +17,10 @@ from ...geometry.planarity import planarity
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...topology import Topology
+from ..boundary_curves import BoundaryCurves
 from ..job.plan import Stage
 from ..job.pulls import Pulls
 from ..references import GivenReference
-from .boundary_curves import BoundaryCurves
 from .flat_edges import edges_to_keep_flat
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard

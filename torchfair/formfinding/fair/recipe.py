@@ -11,9 +11,9 @@ from torch import Tensor
 from ...projection import Callback
 from ...projection.layout import State
 from ...topology import Topology
+from ..boundary_curves import BoundaryCurves
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference
-from .boundary_curves import BoundaryCurves
 from .measures import fair_measures, fair_promises
 from .plan import FairPlan
 from .problem import FairProblem, boundary_curves
