@@ -124,7 +124,7 @@ def test_faults_of_options_and_files_are_command_errors(tmp_path: Path) -> None:
     ):
         with pytest.raises(CommandError, match=message):
             parse(fair.COMMAND, *words)
-    with pytest.raises(CommandError, match="^--smoothing .* at most --coarse-smoothing, got"):
+    with pytest.raises(CommandError, match=r"^--smoothing .* at most --coarse-smoothing, got"):
         parse(form.COMMAND, "--smoothing", "0.9", "--coarse-smoothing", "0.1")
     (tmp_path / "mine.json").write_text('{"boundary": "loose"}')
     with pytest.raises(CommandError, match=r"mine\.json: boundary: expected one of glide"):
