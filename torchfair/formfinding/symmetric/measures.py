@@ -52,8 +52,8 @@ def symmetric_measures(
         the tangent plane (1 if there are none). ``crossing_pyramids_negative`` and ``crossing_pyramids``: negative
         stars, and all interior vertices, whose normal pyramid intersects itself. ``normal_variation`` (E) and
         ``total_absolute_curvature`` (C) and their quotient ``energy_over_curvature``; ``area``;
-        ``mean_edge_length``; ``smallest_angle_degrees``; ``flipped_faces``: those that look the other way than the faces beside them;
-        ``largest_handle_distance``.
+        ``mean_edge_length``; ``smallest_angle_degrees``; ``flipped_faces``: those that look the other way than the
+        faces beside them; ``largest_handle_distance``.
     """
     topology = principal.topology
     residuals = condition_residuals(vertices, principal, stars)

@@ -28,7 +28,8 @@ def symmetric_promises(
 
     Args:
         settings: Of the job.
-        before, after: Measures of the mesh on which the level starts, and of the result.
+        before: Measures of the mesh on which the level starts.
+        after: Those of the result.
         first: Measures of the mesh that was given, where that was refined; None where it starts this level.
         has_handles: Whether vertices are pulled.
         keeps_shape: Whether the shape is kept.
