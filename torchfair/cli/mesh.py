@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .arguments import positive_count
+from .edge_marks import file_of_marks
 from .errors import CommandError
 from .exit_codes import IN_WORDS, exit_code
 from .inputs import add_repair, read_input
@@ -116,8 +117,9 @@ class MeshOutputs(Outputs):
 
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
         super().__init__(arguments, pictures)
-        if arguments.triangles and self.mesh.suffix.lower() != ".obj":
-            self.beside = {self.mesh.with_suffix(".edges.json"): _labels}
+        beside = file_of_marks(self.mesh)
+        if arguments.triangles and beside is not None:
+            self.beside = {beside: _labels}
 
     def polylines(self, result: Any) -> Any:
         """Principal edges, unless they stand in a file beside."""

@@ -14,7 +14,7 @@ from ...creases import crease_chains, crease_corners, crease_edges
 from ...projection import ElementTerm
 from ...subdivision import Refinement
 from ...topology import Topology
-from .boundary_curves import BoundaryCurves
+from ..boundary_curves import BoundaryCurves
 
 
 class FeatureCurves(NamedTuple):

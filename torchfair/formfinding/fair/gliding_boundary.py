@@ -5,10 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ...constraints.gliding import CurveFeet
 from ...projection.layout import State
+from ..boundary_curves import BoundaryCurves
 from ..job.pulls import Pulls
-from .boundary_curves import BoundaryCurves
 
 
 class GlidingBoundary:
@@ -33,8 +32,7 @@ class GlidingBoundary:
         self._pulls, self.held = pulls, held
         chosen = torch.nonzero(rim.owners >= 0).squeeze(1)
         self._loose = torch.isin(chosen, loose)[:, None]
-        curves = rim.splines()
-        self.feet = None if curves is None else CurveFeet(curves, chosen, rim.owners[chosen])
+        self.feet = rim.feet()
 
     def placed(self, state: State) -> Tensor:
         """The vertices (V, 3) of a state with those that glide put on their curves."""
