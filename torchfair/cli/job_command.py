@@ -102,18 +102,19 @@ class JobCommand(ABC):
         outputs.make_folders()
         result = self._solve(request, settings)
         outputs.write_mesh(request, result)
-        missed = missed_lines(result, getattr(arguments, "levels", 0))
+        missed = [*missed_lines(result, getattr(arguments, "levels", 0)), *request.missed]
         lines = [
             *(f"repaired: {sentence}" for sentence in request.mesh.repairs),
             *note_lines([*request.notes, *result.notes], missed),
             *measures_table(result.before, result.after),
             *kept_lines(result),
             *work_lines(result),
+            *outputs.lines(),
         ]
         print("\n".join(lines), flush=True)
         outputs.write_others(self._report(arguments, request, result, settings), request, result)
         print("\n".join([*(f"wrote {path}" for path in outputs.paths()), *missed]))
-        return self._exit_code(result, missed)
+        return self._exit_code(request, result, missed)
 
     def _solve(self, request: Request, settings: Any) -> JobResult[Any]:
         from ..progress import ProgressDisplay
@@ -131,10 +132,10 @@ class JobCommand(ABC):
         own = {"job": self.job, "request": asked, **request.report}
         return {**own, **job_report(result, settings)}
 
-    def _exit_code(self, result: JobResult[Any], missed: Sequence[str]) -> int:
+    def _exit_code(self, request: Request, result: JobResult[Any], missed: Sequence[str]) -> int:
         from ..projection import Status
 
-        if result.projection.status is Status.INTERRUPTED:
+        if request.interrupted or result.projection.status is Status.INTERRUPTED:
             return EXIT_INTERRUPTED
         return EXIT_NOT_REACHED if missed else EXIT_OK
 
