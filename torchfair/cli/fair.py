@@ -79,7 +79,7 @@ class FairCommand(JobCommand):
             "handles": read_handles(arguments, mesh),
             "levels": arguments.levels,
         }
-        marks, notes = read_marks(mesh, arguments.input)
+        marks, notes = read_marks(mesh, arguments)
         return Request(mesh, options, notes=notes, marks=marks)
 
 

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .._ranges import ranges
 from ..errors import MeshFileError
 from .raw_mesh import Ints, RawMesh
-from .text import Words, ranges, to_floats, to_ints
+from .text import Words, to_floats, to_ints
 
 KEPT = (b"g", b"o", b"s", b"usemtl", b"mtllib")
 _IN_WORDS = {b"g": "groups", b"o": "object names", b"s": "smoothing groups", b"usemtl": "materials",
