@@ -20,8 +20,14 @@ from .off import read_off
 from .ply import read_ply
 from .polygon_mesh import PolygonMesh
 from .raw_mesh import RawMesh
+from .stl import read_stl
 
-_READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
+_READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+}
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"PK\x03\x04": "zip", b"BZh": "bzip2", b"\xfd7zXZ\0": "xz"}
 
 

@@ -6,6 +6,7 @@ after the other and keeps account of what became of every vertex, face and corne
 
 from .packed import repair_packed as repair_packed
 from .packed import weld_packed as weld_packed
+from .packed import weld_soup as weld_soup
 from .repair_mesh import repair_mesh as repair_mesh
 from .result import RepairedMesh as RepairedMesh
 from .seams import coincident_edges as coincident_edges

@@ -17,7 +17,7 @@ from .faces import without_duplicates, without_flat_faces
 from .fans import with_fans_apart
 from .orientation import oriented
 from .result import RepairedMesh
-from .soup import Bools, Soup
+from .soup import Bools, Floats, Soup
 from .t_junctions import with_t_junctions_joined
 from .welding import checked_tolerance, weld_tolerance, welded
 
@@ -62,6 +62,12 @@ def weld_packed(
     kept = np.ones(len(soup.points), bool)
     kept[_merged_away(soup)] = False
     return _result(vertices, soup, np.zeros(len(soup.faces), bool), kept)
+
+
+def weld_soup(points: Floats, corners: Ints, offsets: Ints, tolerance: float) -> Soup:
+    """Seams of packed faces closed, which may be no manifold; points (V, 3), tolerance in their unit."""
+    soup = Soup.of(points[:, None], corners, offsets)
+    return welded(soup, tolerance / soup.unit)
 
 
 def _soup(vertices: Tensor, corners: Ints, offsets: Ints) -> Soup:
