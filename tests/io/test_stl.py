@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from torchfair import MeshFileError
+from torchfair.geometry import face_area_vectors
 from torchfair.io import PolygonMesh, load_mesh, save_mesh
 from torchfair.triangulation import triangulate
 

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from ..topology import Topology
 
 _NOT_ASKED = ("run", "name", "version")
-_MESH_FORMATS = (".obj", ".off", ".ply", ".stl", ".glb")
+_MESH_FORMATS = (".obj", ".off", ".ply", ".stl", ".glb", ".3dm")
+_WITH_ATTRIBUTES = (".obj", ".3dm")
 _TRIANGLES = (".stl", ".glb")
 
 
@@ -150,7 +151,7 @@ def save_result(
         polylines: Line elements of an OBJ file.
         marks: Whether line elements of the source are carried on.
     """
-    from ..io import save_mesh
+    from ..io import RhinoParts, save_mesh
 
     suffix, notes = path.suffix.lower(), []
     attributes = source.attributes
@@ -164,7 +165,11 @@ def save_result(
 
         notes.append(f"{path.name} holds its polygons cut into triangles: {suffix} files have no others")
         topology = Topology.from_faces(triangulate(vertices, topology).triangles, topology.num_vertices)
-    kept = attributes if suffix == ".obj" and same else None
+    kept = attributes if same else None
+    if isinstance(attributes, RhinoParts):
+        kept = attributes if same else attributes.of_other_faces(topology.num_faces)
+    if isinstance(kept, RhinoParts) != (suffix == ".3dm") or suffix not in _WITH_ATTRIBUTES:
+        kept = None
     save_mesh(path, vertices, topology, overwrite=force, polylines=polylines, attributes=kept)
     return notes
 
@@ -177,7 +182,7 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
         "--output",
         required=True,
         metavar="OUTPUT",
-        help="mesh file to write (OBJ, OFF, PLY, STL or GLB)",
+        help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM)",
     )
     add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
     add("--no-pictures", action="store_true", help="write no pictures")

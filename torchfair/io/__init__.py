@@ -21,4 +21,5 @@ from .polygon_mesh import PolygonMesh as PolygonMesh
 from .reading import load_mesh as load_mesh
 from .report import versions as versions
 from .report import write_report as write_report
+from .rhino_parts import RhinoParts as RhinoParts
 from .writing import save_mesh as save_mesh

@@ -9,6 +9,7 @@ from torch import Tensor
 from .._names import FROM_ZERO, Names
 from ..topology import Topology
 from .obj_attributes import ObjAttributes
+from .rhino_parts import RhinoParts
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +27,8 @@ class PolygonMesh:
         names: what vertices and faces are called in the file, for messages.
         vertex_map: (V of the file,) number of each vertex of the file in this mesh, -1 where it was dropped; None if
             all are there in the order of the file.
-        attributes: groups, materials, texture coordinates and the like of an OBJ file, for :func:`save_mesh`; None
-            without.
+        attributes: groups, materials, texture coordinates and the like of an OBJ file, or unit, layers and names of a
+            3DM file, for :func:`save_mesh`; None without.
     """
 
     vertices: Tensor
@@ -36,7 +37,7 @@ class PolygonMesh:
     notes: tuple[str, ...] = ()
     names: Names = FROM_ZERO
     vertex_map: Tensor | None = None
-    attributes: ObjAttributes | None = None
+    attributes: ObjAttributes | RhinoParts | None = None
 
     def __post_init__(self) -> None:
         self.topology.check_vertices(self.vertices)

@@ -14,6 +14,7 @@ from ..errors import MeshFileError
 
 if TYPE_CHECKING:
     from .obj_attributes import ObjAttributes
+    from .rhino_parts import RhinoParts
 
 Floats = npt.NDArray[np.float64]
 
@@ -39,7 +40,7 @@ class RawMesh(NamedTuple):
     offsets: Ints  # (F+1,)
     names: Names = FROM_ZERO
     notes: tuple[str, ...] = ()  # what was left out, or read in spite of a fault
-    attributes: ObjAttributes | None = None  # of OBJ files
+    attributes: ObjAttributes | RhinoParts | None = None  # of OBJ and 3DM files
 
 
 def assemble(origin: Origin, points: Floats, corners: Ints, sizes: Ints) -> RawMesh:

@@ -20,6 +20,7 @@ from .off import read_off
 from .ply import read_ply
 from .polygon_mesh import PolygonMesh
 from .raw_mesh import RawMesh
+from .rhino import read_rhino
 from .stl import read_stl
 
 _READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {
@@ -27,6 +28,7 @@ _READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {
     ".off": read_off,
     ".ply": read_ply,
     ".stl": read_stl,
+    ".3dm": read_rhino,
 }
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"PK\x03\x04": "zip", b"BZh": "bzip2", b"\xfd7zXZ\0": "xz"}
 
@@ -36,10 +38,11 @@ def load_mesh(
 ) -> PolygonMesh:
     """The polygon mesh of a file.
 
-    The format follows from the extension, upper or lower case. OBJ, OFF and PLY (text and binary) keep
-    polygons, vertex order and orientation exactly. Corners of STL files at the same position become one vertex where an
-    edge joins them. GLB, GLTF, DAE and 3MF go through trimesh with ``process=False``. Vertices that no face uses are
-    legal. Edges of the boundary that lie on each other are told in ``PolygonMesh.notes``.
+    The format follows from the extension, upper or lower case. OBJ, OFF and PLY (text and binary) keep polygons, vertex
+    order and orientation exactly. Corners of STL files at the same position become one vertex where an edge joins them.
+    3DM files hold their visible meshes in one (with the package rhino3dm). GLB, GLTF, DAE and 3MF go through trimesh
+    with ``process=False``. Vertices that no face uses are legal. Edges of the boundary that lie on each other are told
+    in ``PolygonMesh.notes``.
 
     Args:
         path: the file.
@@ -53,6 +56,7 @@ def load_mesh(
         MeshFileError: for every fault of the file and of its mesh, with the line number where there is one, in the
             numbers of the file (from 1 in OBJ files), with what mends it.
         SettingsError: ``weld`` is no distance.
+        TorchfairError: rhino3dm, which reads 3DM files, is not installed.
     """
     path = Path(path)
     raw = _read_raw(path)
