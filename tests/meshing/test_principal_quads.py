@@ -258,6 +258,9 @@ def test_what_is_wrong_with_the_input_is_said() -> None:
         ("align_boundary", 1, "align_boundary"),
         ("boundary_angle", 1.0, "boundary_angle"),
         ("corner_angle", 0.0, "corner_angle"),
+        ("adaptive", 1, "adaptive"),
+        ("spacing_range", 0.9, "spacing_range"),
+        ("spacing_range", math.inf, "spacing_range"),
         ("time_limit", -1.0, "time_limit"),
     ],
 )

@@ -42,6 +42,9 @@ _ROWS = {
     "total_absolute_curvature": "C of the surface",
     "variation_over_curvature": "E/C",
     "distance_max": "largest distance from the surface, in mean edges",
+    "spacing_shortest": "shortest spacing asked for",
+    "spacing_longest": "longest ...",
+    "range_share": "share of the surface at the ends of the range",
 }
 
 
@@ -149,7 +152,7 @@ def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
 
 def _table(report: Mapping[str, Any]) -> list[str]:
     width = max(map(len, _ROWS.values()))
-    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items()]
+    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items() if name in report]
     found = ", ".join(f"{count} of index {index}" for index, count in report["singular"].items())
     return [*lines, f"{'singular points':<{width}}  {found or 'none':>10}"]
 

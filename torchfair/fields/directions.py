@@ -64,6 +64,11 @@ def carried_directions(directions: Directions, frames: FaceFrames, finer: FaceFr
         finer: frames of the fine mesh.
         parents: (F',) coarse triangle of every fine one, in the same plane.
     """
-    x, y = ((frames.first[parents] * axis).sum(1) for axis in (finer.first, finer.second))
-    turned = directions.values[parents] * np.exp(2j * np.arctan2(y, x))
+    turned = turned_values(directions.values, frames, finer, parents)
     return Directions(turned, directions.means[parents], directions.confidence[parents])
+
+
+def turned_values(values: Complexes, frames: FaceFrames, finer: FaceFrames, parents: Ints) -> Complexes:
+    """Traceless tensors (F,) of coarse triangles in the frames of finer ones (F',) that lie in them."""
+    x, y = ((frames.first[parents] * axis).sum(1) for axis in (finer.first, finer.second))
+    return np.asarray(values[parents] * np.exp(2j * np.arctan2(y, x)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from ..boundary import boundary_corners
 from ..errors import MeshError
@@ -83,17 +84,18 @@ def attempt(
         FailedAttemptError: if that gives no valid mesh.
     """
     frames = surface.frames
+    spacings = _spacings(surface, graph, plan)
     runs: list[BoundaryRun] = []
     if plan.align:
-        shortest = _SHORTEST_RUN * plan.spacing
+        shortest = _SHORTEST_RUN * spacings.max(1)
         runs = find_runs(frames, graph, settings.boundary_angle, shortest, lattice.aligned)
     corners = boundary_corners(surface.vertices, surface.topology, settings.corner_angle).numpy()
-    found = _map(surface, graph, lattice, plan, runs)
+    found = _map(surface, graph, lattice, spacings, runs)
     inward = inward_moves(found.seams, found.values, frames.triangles, runs)
     try:
         cells = trace_cells(found, off_the_lines(found, inward), corners)
-        area = lattice.cell * plan.spacing**2
-        whole = compact(tidy_boundary(cells, plan.spacing, area))
+        near = spacings[KDTree(frames.centres).query(cells.positions)[1]] if surface.sizes else spacings[:1]
+        whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1)))
         verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None
@@ -114,7 +116,16 @@ def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
     return {(int(a), int(b)) for a, b in numbered if 0 <= a < b}
 
 
-def _map(surface: DesignSurface, graph: CutGraph, lattice: Lattice, plan: Plan, runs: list[BoundaryRun]) -> SeamlessMap:
+def _spacings(surface: DesignSurface, graph: CutGraph, plan: Plan) -> Floats:
+    """(F, 2) lengths of edges along the field and across, but for those of the lattice."""
+    if surface.sizes is None:
+        return np.full((len(surface.frames.areas), 2), plan.spacing)
+    return np.asarray(plan.spacing * np.exp(surface.sizes.along(graph.angles)))
+
+
+def _map(
+    surface: DesignSurface, graph: CutGraph, lattice: Lattice, spacings: Floats, runs: list[BoundaryRun]
+) -> SeamlessMap:
     """A map that is one to one near every point."""
     frames = surface.frames
     seams = find_seams(frames, graph)
@@ -125,7 +136,7 @@ def _map(surface: DesignSurface, graph: CutGraph, lattice: Lattice, plan: Plan, 
         seams=seams,
         split=split_integers(frames, graph, seams, runs),
         shear=lattice.matrix,
-        density=np.tile(1 / (plan.spacing * np.array(lattice.spacings)), (count, 1)),
+        density=1 / (spacings * lattice.spacings),
         anisotropy=np.full(count, _ANISOTROPY),
     )
     best: SeamlessMap | None = None

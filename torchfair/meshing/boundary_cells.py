@@ -15,45 +15,51 @@ _SMALL = 0.08  # area of faces at the boundary, over that of full cells
 _ROUNDS = 8
 
 
-def tidy_boundary(cells: Cells, spacing: float, area: float) -> PolygonEdits:
+def tidy_boundary(cells: Cells, spacing: float | Floats, area: float | Floats) -> PolygonEdits:
     """Collapses short edges at the boundary and joins slivers with their neighbours, each change checked.
 
     Args:
         cells: of a map.
-        spacing: length of edges.
-        area: of full cells.
+        spacing: length of edges, also (N,) at the nodes.
+        area: of full cells, also (N,).
 
     Returns:
         The polygons; positions that no face uses are among theirs.
     """
     faces = [face for face in cells.faces if len(face) > 2]  # bulges of the boundary over one line
     edits = PolygonEdits(cells.positions.copy(), faces, cells.on_boundary.copy(), cells.is_corner | cells.singular)
+    shortest = np.broadcast_to(_SHORT * np.asarray(spacing), len(cells.positions))
+    smallest = np.broadcast_to(_SMALL * np.asarray(area), len(cells.positions))
     for _ in range(_ROUNDS):
         for number in edits.boundary_faces():
             edits.drop_straight_nodes(number)
-        if not _collapse_short(edits, _SHORT * spacing) + _join_small(edits, _SMALL * area):
+        if not _collapse_short(edits, shortest) + _join_small(edits, smallest):
             break
     return edits
 
 
-def _collapse_short(edits: PolygonEdits, limit: float) -> int:
+def _collapse_short(edits: PolygonEdits, shortest: Floats) -> int:
     """Collapses edges at the boundary below a length, the shortest first."""
+
+    def share(edge: tuple[int, int]) -> float:
+        return edits.length(edge) / float(shortest[list(edge)].min())
+
     sides = {(min(edge), max(edge)) for number in edits.boundary_faces() for edge in edits.sides(number)}
-    lengths = sorted((edits.length((a, b)), (a, b)) for a, b in sides if edits.on_boundary[a] or edits.on_boundary[b])
+    shares = sorted((share((a, b)), (a, b)) for a, b in sides if edits.on_boundary[a] or edits.on_boundary[b])
     done = 0
-    for length, (a, b) in lengths:
-        if length >= limit:
+    for before, (a, b) in shares:
+        if before >= 1:
             break
-        if edits.around.get(a) and edits.around.get(b) and edits.length((a, b)) < limit:
+        if edits.around.get(a) and edits.around.get(b) and share((a, b)) < 1:
             done += edits.collapse((a, b))
     return done
 
 
-def _join_small(edits: PolygonEdits, limit: float) -> int:
+def _join_small(edits: PolygonEdits, smallest: Floats) -> int:
     """Joins faces below an area with the neighbour across their longest side, or collapses their shortest."""
     done = 0
     for number in edits.boundary_faces():
-        if number not in edits.faces or edits.area(number) >= limit:
+        if number not in edits.faces or edits.area(number) >= smallest[edits.faces[number]].min():
             continue
         sides = sorted(edits.sides(number), key=edits.length)
         inner = [edge for edge in sides if edits.across(edge, number) is not None]

@@ -27,7 +27,7 @@ class BoundaryRun(NamedTuple):
 
 
 def find_runs(
-    frames: FaceFrames, graph: CutGraph, angle: float, shortest: float, components: tuple[int, ...] = (0, 1)
+    frames: FaceFrames, graph: CutGraph, angle: float, shortest: float | Floats, components: tuple[int, ...] = (0, 1)
 ) -> list[BoundaryRun]:
     """Longest stretches of the boundary that follow the field, cut where the mesh is cut.
 
@@ -35,7 +35,7 @@ def find_runs(
         frames: of the triangles.
         graph: the cut.
         angle: largest angle between an edge and the field, radians.
-        shortest: length of a stretch that counts.
+        shortest: length of a stretch that counts, also (F,) by the triangles that it runs along.
         components: coordinates whose lines run along or across the field.
     """
     topology = frames.topology
@@ -44,6 +44,7 @@ def find_runs(
     corner_from[topology.corners.numpy()[outer]] = outer
     turned = _turned_around(frames, graph)
     runs: list[BoundaryRun] = []
+    least = np.broadcast_to(np.asarray(shortest), len(frames.triangles))
     for loop in topology.boundary_loops():
         corners = corner_from[loop.numpy()]
         quarter, off, length = _against_field(frames, graph, corners)
@@ -51,7 +52,7 @@ def find_runs(
             (quarter == (np.roll(quarter, 1) - turned[loop.numpy()]) % 4) & (off <= angle) & np.roll(off <= angle, 1)
         )
         for stretch in _stretches(off <= angle, goes_on):
-            if length[stretch].sum() >= shortest:
+            if (length[stretch] / least[corners[stretch] // 3]).sum() >= 1:
                 runs += _cut_where_frames_turn(corners[stretch], quarter[stretch])
     return [run for run in runs if run.component in components]
 

@@ -16,9 +16,11 @@ from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
 from ..topology import Topology
+from .curvature_sizes import CurvatureSizes
 from .ladder import NoMeshError, mesh_component
 from .lattice import Lattice
 from .settings import MeshingSettings
+from .sizes import SizeField
 from .surface import DesignSurface, components_of
 from .verification import Shape, shape_of
 
@@ -67,6 +69,11 @@ class ReadSurface:
             np.concatenate([of.confidence for of in self.fields]),
         )
 
+    def sized(self, sizes: SizeField) -> list[DesignSurface]:
+        """The components with spacings that differ."""
+        counts = [part.topology.num_faces for part in self.parts]
+        return [replace(part, sizes=of) for part, of in zip(self.parts, sizes.split(counts), strict=True)]
+
     @cached_property
     def shape(self) -> Shape:
         """Euler number, loops and components."""
@@ -112,6 +119,7 @@ class Pieces:
         places: (n, 3) singular points.
         indices: (n,) of the field.
         notes: what was changed, in words.
+        sizes: what lengths were asked for, None if they were the same everywhere.
     """
 
     positions: Floats
@@ -120,17 +128,30 @@ class Pieces:
     places: Tensor
     indices: Tensor
     notes: list[str]
+    sizes: CurvatureSizes | None = None
 
 
-def mesh_components(surface: ReadSurface, lattices: list[Lattice], spacing: float, settings: MeshingSettings) -> Pieces:
-    """Meshes every component with a lattice.
+Sizing = Callable[[float], CurvatureSizes]
+"""Spacings over the mean one that is given, in all triangles of a surface."""
+
+
+def mesh_components(
+    surface: ReadSurface,
+    lattices: list[Lattice],
+    spacing: float,
+    settings: MeshingSettings,
+    sizing: Sizing | None = None,
+) -> Pieces:
+    """Meshes every component with a lattice, with edges of one length or of different ones.
 
     Raises:
         NoMeshError: if one has no valid mesh.
     """
     positions, faces, rows, places, indices, notes = [], [], set(), [], [], []
     offset = 0
-    for number, (part, directions) in enumerate(zip(surface.parts, surface.fields, strict=True)):
+    sizes = sizing and sizing(spacing)
+    parts = surface.parts if sizes is None else surface.sized(sizes.field)
+    for number, (part, directions) in enumerate(zip(parts, surface.fields, strict=True)):
         smoothing = settings.smoothing_length(surface.rings[number])
         mesh, words = mesh_component(part, directions, lattices[number], spacing, smoothing, settings)
         if words:
@@ -143,7 +164,7 @@ def mesh_components(surface: ReadSurface, lattices: list[Lattice], spacing: floa
         indices.append(mesh.singular_charges / 4)
         offset += len(mesh.positions)
     at = torch.from_numpy(np.concatenate(places))
-    return Pieces(np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes)
+    return Pieces(np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes, sizes)
 
 
 def mesh_to_count(
@@ -153,6 +174,7 @@ def mesh_to_count(
     settings: MeshingSettings,
     count: int | None,
     faces_of: Callable[[Pieces], int],
+    sizing: Sizing | None = None,
 ) -> tuple[Pieces, float]:
     """Meshes with a spacing, then with others until the count is about that asked for; and the last spacing.
 
@@ -165,11 +187,12 @@ def mesh_to_count(
         settings: of the meshes.
         count: None where the spacing is what was asked for.
         faces_of: how many faces pieces have.
+        sizing: lengths of edges that differ, if any.
 
     Raises:
         NoMeshError: if the first spacing gives no valid mesh.
     """
-    best = mesh_components(surface, lattices, spacing, settings)
+    best = mesh_components(surface, lattices, spacing, settings, sizing)
     if count is None:
         return best, spacing
     short = replace(settings, time_limit=settings.time_limit * _SHARE)
@@ -179,7 +202,7 @@ def mesh_to_count(
             break
         other = spacing * math.sqrt(ratio)
         try:
-            again = mesh_components(surface, lattices, other, short)
+            again = mesh_components(surface, lattices, other, short, sizing)
         except NoMeshError:
             break
         if abs(faces_of(again) / count - 1) >= abs(ratio - 1) or len(again.notes) > len(best.notes):

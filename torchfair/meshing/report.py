@@ -14,6 +14,7 @@ from ..energies import NormalVariation, TotalAbsoluteCurvature
 from ..geometry import ReferenceSurface, edge_lengths, face_centres, planarity
 from ..topology import Topology
 from .components import ReadSurface
+from .curvature_sizes import ASKED
 from .measures import angles_to_directions
 from .quad_mesh import QuadMesh
 from .verification import shape_of
@@ -85,4 +86,6 @@ def measure_mesh_on(vertices: Tensor, mesh: QuadMesh) -> dict[str, Any]:
         ShapeError: if the vertices do not fit the mesh.
     """
     points, topology = one_mesh(vertices, mesh.topology).cpu().double(), mesh.topology.to("cpu")
-    return measure(points, topology, mesh.surface, mesh.report["spacing"], mesh.singular_indices.cpu().double())
+    asked = {name: mesh.report[name] for name in ASKED if name in mesh.report}
+    report = measure(points, topology, mesh.surface, mesh.report["spacing"], mesh.singular_indices.cpu().double())
+    return {**report, **asked}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -18,6 +18,7 @@ from ..geometry import degenerate_faces, rings_for_noise
 from ..subdivision import midpoint
 from ..topology import Topology
 from ..triangulation import triangulate
+from .sizes import SizeField
 
 _COARSE = 1.0  # mean edge over the spacing above which triangles are cut
 _MOST_FACES = 40_000  # that are made by cutting
@@ -31,11 +32,13 @@ class DesignSurface:
         vertices: (V, 3) float64, on the CPU.
         topology: triangles.
         numbers: (V,) of the vertices in the mesh that was given.
+        sizes: spacings of the new mesh over the mean one, None for the same everywhere.
     """
 
     vertices: Tensor
     topology: Topology
     numbers: Tensor
+    sizes: SizeField | None = None
 
     @cached_property
     def frames(self) -> FaceFrames:
@@ -56,7 +59,8 @@ class DesignSurface:
             cut = DesignSurface(finer.apply(surface.vertices), finer.topology, torch.cat([surface.numbers, new]))
             parents = finer.face_parents.numpy()
             directions = carried_directions(directions, surface.frames, cut.frames, parents)
-            surface = cut
+            sizes = surface.sizes and surface.sizes.carried(surface.frames, cut.frames, parents)
+            surface = replace(cut, sizes=sizes)
         return surface, directions
 
 
