@@ -62,7 +62,7 @@ class ReadSurface:
     def directions(self) -> Directions:
         """Of all components."""
         return Directions(
-            np.concatenate([of.values for of in self.fields]),
+            np.concatenate([of.at_corners for of in self.fields]),
             np.concatenate([of.means for of in self.fields]),
             np.concatenate([of.confidence for of in self.fields]),
         )

@@ -72,7 +72,7 @@ def principal_triangles(
     lattices = [triangle_lattice(ratio)] * len(surface.parts)
     size = spacing_of(surface, ratio / 2, count, spacing)
     across = _rows_across(surface.frames, surface.directions)
-    turned = replace(surface, fields=[_turned(of) for of in surface.fields]) if across else surface
+    turned = replace(surface, fields=[of.turned for of in surface.fields]) if across else surface
     pieces, size = mesh_to_count(turned, lattices, size, chosen, count, _triangles)
     triangles = cut_cells(pieces.positions, pieces.faces, pieces.rows)
     positions = torch.from_numpy(pieces.positions)
@@ -119,10 +119,6 @@ def _row_distance(frames: FaceFrames, directions: Directions) -> float:
         return _EQUILATERAL
     share = float(min(larger, smaller)) / total
     return min(max(math.sqrt(share / (2 * _EXCESS)), _EQUILATERAL), _MOST)
-
-
-def _turned(directions: Directions) -> Directions:
-    return Directions(-directions.values, directions.means, directions.confidence)
 
 
 def _mask(topology: Topology, rows: set[tuple[int, int]]) -> Tensor:
