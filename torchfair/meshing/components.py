@@ -112,6 +112,7 @@ class Pieces:
         places: (n, 3) singular points.
         indices: (n,) of the field.
         notes: what was changed, in words.
+        plans: (components) number of the plan that gave each.
     """
 
     positions: Floats
@@ -120,19 +121,35 @@ class Pieces:
     places: Tensor
     indices: Tensor
     notes: list[str]
+    plans: list[int]
 
 
-def mesh_components(surface: ReadSurface, lattices: list[Lattice], spacing: float, settings: MeshingSettings) -> Pieces:
+def mesh_components(
+    surface: ReadSurface,
+    lattices: list[Lattice],
+    spacing: float,
+    settings: MeshingSettings,
+    first: list[int] | None = None,
+) -> Pieces:
     """Meshes every component with a lattice.
+
+    Args:
+        surface: with its directions.
+        lattices: of the components.
+        spacing: length of edges.
+        settings: of the meshes.
+        first: number of the plan to begin with for every component, by default what was asked for.
 
     Raises:
         NoMeshError: if one has no valid mesh.
     """
-    positions, faces, rows, places, indices, notes = [], [], set(), [], [], []
+    positions, faces, rows, places, indices, notes, taken = [], [], set(), [], [], [], []
     offset = 0
     for number, (part, directions) in enumerate(zip(surface.parts, surface.fields, strict=True)):
         smoothing = settings.smoothing_length(surface.rings[number])
-        mesh, words = mesh_component(part, directions, lattices[number], spacing, smoothing, settings)
+        begin = 0 if first is None else first[number]
+        mesh, words, plan = mesh_component(part, directions, lattices[number], spacing, smoothing, settings, begin)
+        taken.append(plan)
         if words:
             name = _name(number, len(surface.parts))
             notes.append(f"{name}not as asked for, which gave no valid mesh: {words}")
@@ -143,7 +160,7 @@ def mesh_components(surface: ReadSurface, lattices: list[Lattice], spacing: floa
         indices.append(mesh.singular_charges / 4)
         offset += len(mesh.positions)
     at = torch.from_numpy(np.concatenate(places))
-    return Pieces(np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes)
+    return Pieces(np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes, taken)
 
 
 def mesh_to_count(
@@ -179,7 +196,7 @@ def mesh_to_count(
             break
         other = spacing * math.sqrt(ratio)
         try:
-            again = mesh_components(surface, lattices, other, short)
+            again = mesh_components(surface, lattices, other, short, best.plans)
         except NoMeshError:
             break
         if abs(faces_of(again) / count - 1) >= abs(ratio - 1) or len(again.notes) > len(best.notes):

@@ -13,15 +13,16 @@ import torch
 from ..fields.frames import FaceFrames, Floats, Ints
 from ..fields.matchings import QUARTER
 from ..linear import Factor, RslabDirect, factorise
-from .closest_vectors import closest_vectors
 from .cut_graph import CutGraph
-from .integers import IntegerSplit
+from .integers import IntegerSplit, real_form
 from .seams import ROTATIONS, Seams
+from .separation import gaps, separate_vectors
 
 WANTED = np.array([1.0, 0.0, 0.0, 1.0])
 """Jacobian of a map as wanted: gradients of the first coordinate along and across the field, then of the second."""
 
 _TRIED = 16  # whole vectors, until no triangle is turned over
+_NEAR = 2.5  # spacings: singular vertices within that are kept apart
 _THIN = 0.05  # of the area wanted, below which triangles are counted as nearly turned over
 
 
@@ -112,11 +113,15 @@ class MapProblem:
         optimum = self._optimum
         if not len(optimum.target):
             return [self.map_of(optimum.base.copy())]
+        near = _NEAR * float(np.median(self.density.prod(1))) ** -0.5
+        between = real_form(gaps(self.frames, self.graph, self.seams, near))
+        sets = separate_vectors(optimum.metric, optimum.target, between @ optimum.moves, between @ optimum.base)
         found = []
-        for vector in closest_vectors(optimum.metric, optimum.target).vectors[:_TRIED]:
-            found.append(self.map_of(optimum.base + optimum.moves @ vector))
-            if found[-1].is_sound:
-                return [found[-1]]
+        for vectors in sets:
+            for vector in vectors.vectors[:_TRIED]:
+                found.append(self.map_of(optimum.base + optimum.moves @ vector))
+                if found[-1].is_sound:
+                    return [found[-1]]
         return sorted(found, key=badness)
 
     @property

@@ -26,7 +26,7 @@ class MeshingSettings:
         boundary_angle: How far they may turn from the direction, radians.
         corner_angle: Boundary vertices that turn by more are corners and stay, radians.
         fallback: Whether other settings are tried where these give no valid mesh; what was taken is said.
-        time_limit: No other settings are tried after so many seconds for a component.
+        time_limit: No other settings are tried after so many seconds of processor time for a component.
 
     Raises:
         SettingsError: a setting is out of its range; names it.
