@@ -10,7 +10,7 @@ from .direction_field import hermitian_solver as hermitian_solver
 from .directions import Directions as Directions
 from .directions import carried_directions as carried_directions
 from .directions import directions_of as directions_of
-from .directions import turned_values as turned_values
+from .directions import half_turns as half_turns
 from .frames import FaceFrames as FaceFrames
 from .matchings import loop_charges as loop_charges
 from .matchings import matchings as matchings

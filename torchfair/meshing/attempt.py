@@ -16,6 +16,7 @@ from .crossings import off_the_lines
 from .cut_graph import CutGraph
 from .integers import split_integers
 from .lattice import Lattice
+from .relaxation import loosened, stretched
 from .seamless_map import MapProblem, SeamlessMap
 from .seams import find_seams
 from .settings import MeshingSettings
@@ -139,14 +140,24 @@ def _map(
         density=1 / (spacings * lattice.spacings),
         anisotropy=np.full(count, _ANISOTROPY),
     )
-    best: SeamlessMap | None = None
-    for candidate in problem.candidates()[:_UNTANGLED]:
-        best = untangled(problem, candidate)
-        if best.is_sound:
-            return best
-    assert best is not None
+    wanted, problem = problem.density, stretched(problem)
+    best = _untangled(problem)
+    looser = problem if best.is_sound else loosened(problem, wanted)
+    if looser is not problem:
+        best = _untangled(looser)
+    if best.is_sound:
+        return best
     vertices = best.branches if len(best.branches) else frames.triangles[best.flips[0]]
     raise _failure(surface, int(vertices[0]))
+
+
+def _untangled(problem: MapProblem) -> SeamlessMap:
+    """The first map that is one to one near every point, or the last that was tried."""
+    for candidate in problem.candidates()[:_UNTANGLED]:
+        found = untangled(problem, candidate)
+        if found.is_sound:
+            break
+    return found
 
 
 def _failure(surface: DesignSurface, vertex: int) -> FailedAttemptError:

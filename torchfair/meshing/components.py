@@ -38,12 +38,14 @@ class ReadSurface:
         fields: directions of each.
         rings: over how many rings curvature of each is averaged.
         notes: what was found, in words.
+        sizing: lengths of edges over the mean one, which is given, where they are not the same everywhere.
     """
 
     parts: list[DesignSurface]
     fields: list[Directions]
     rings: list[int]
     notes: list[str]
+    sizing: Callable[[float], CurvatureSizes] | None = None
 
     @cached_property
     def whole(self) -> tuple[Tensor, Topology]:
@@ -64,7 +66,7 @@ class ReadSurface:
     def directions(self) -> Directions:
         """Of all components."""
         return Directions(
-            np.concatenate([of.values for of in self.fields]),
+            np.concatenate([of.at_corners for of in self.fields]),
             np.concatenate([of.means for of in self.fields]),
             np.concatenate([of.confidence for of in self.fields]),
         )
@@ -119,6 +121,7 @@ class Pieces:
         places: (n, 3) singular points.
         indices: (n,) of the field.
         notes: what was changed, in words.
+        plans: (components) number of the plan that gave each.
         sizes: what lengths were asked for, None if they were the same everywhere.
     """
 
@@ -128,11 +131,8 @@ class Pieces:
     places: Tensor
     indices: Tensor
     notes: list[str]
-    sizes: CurvatureSizes | None = None
-
-
-Sizing = Callable[[float], CurvatureSizes]
-"""Spacings over the mean one that is given, in all triangles of a surface."""
+    plans: list[int]
+    sizes: CurvatureSizes | None
 
 
 def mesh_components(
@@ -140,20 +140,29 @@ def mesh_components(
     lattices: list[Lattice],
     spacing: float,
     settings: MeshingSettings,
-    sizing: Sizing | None = None,
+    first: list[int] | None = None,
 ) -> Pieces:
-    """Meshes every component with a lattice, with edges of one length or of different ones.
+    """Meshes every component with a lattice.
+
+    Args:
+        surface: with its directions.
+        lattices: of the components.
+        spacing: length of edges.
+        settings: of the meshes.
+        first: number of the plan to begin with for every component, by default what was asked for.
 
     Raises:
         NoMeshError: if one has no valid mesh.
     """
-    positions, faces, rows, places, indices, notes = [], [], set(), [], [], []
+    positions, faces, rows, places, indices, notes, taken = [], [], set(), [], [], [], []
     offset = 0
-    sizes = sizing and sizing(spacing)
+    sizes = surface.sizing and surface.sizing(spacing)
     parts = surface.parts if sizes is None else surface.sized(sizes.field)
     for number, (part, directions) in enumerate(zip(parts, surface.fields, strict=True)):
         smoothing = settings.smoothing_length(surface.rings[number])
-        mesh, words = mesh_component(part, directions, lattices[number], spacing, smoothing, settings)
+        begin = 0 if first is None else first[number]
+        mesh, words, plan = mesh_component(part, directions, lattices[number], spacing, smoothing, settings, begin)
+        taken.append(plan)
         if words:
             name = _name(number, len(surface.parts))
             notes.append(f"{name}not as asked for, which gave no valid mesh: {words}")
@@ -164,7 +173,9 @@ def mesh_components(
         indices.append(mesh.singular_charges / 4)
         offset += len(mesh.positions)
     at = torch.from_numpy(np.concatenate(places))
-    return Pieces(np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes, sizes)
+    return Pieces(
+        np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes, taken, sizes
+    )
 
 
 def mesh_to_count(
@@ -174,7 +185,6 @@ def mesh_to_count(
     settings: MeshingSettings,
     count: int | None,
     faces_of: Callable[[Pieces], int],
-    sizing: Sizing | None = None,
 ) -> tuple[Pieces, float]:
     """Meshes with a spacing, then with others until the count is about that asked for; and the last spacing.
 
@@ -187,12 +197,11 @@ def mesh_to_count(
         settings: of the meshes.
         count: None where the spacing is what was asked for.
         faces_of: how many faces pieces have.
-        sizing: lengths of edges that differ, if any.
 
     Raises:
         NoMeshError: if the first spacing gives no valid mesh.
     """
-    best = mesh_components(surface, lattices, spacing, settings, sizing)
+    best = mesh_components(surface, lattices, spacing, settings)
     if count is None:
         return best, spacing
     short = replace(settings, time_limit=settings.time_limit * _SHARE)
@@ -202,7 +211,7 @@ def mesh_to_count(
             break
         other = spacing * math.sqrt(ratio)
         try:
-            again = mesh_components(surface, lattices, other, short, sizing)
+            again = mesh_components(surface, lattices, other, short, best.plans)
         except NoMeshError:
             break
         if abs(faces_of(again) / count - 1) >= abs(ratio - 1) or len(again.notes) > len(best.notes):

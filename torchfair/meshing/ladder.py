@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator
 from functools import cache
@@ -38,13 +39,23 @@ def mesh_component(
     spacing: float,
     smoothing: float,
     settings: MeshingSettings,
-) -> tuple[PieceMesh, str]:
-    """The mesh of a component by the first plan that gives a valid one, and what was changed, in words.
+    first: int = 0,
+) -> tuple[PieceMesh, str, int]:
+    """The mesh of a component by the first plan that gives a valid one, what was changed, and the plan's number.
+
+    Args:
+        surface: the component.
+        directions: of its triangles.
+        lattice: that is laid on it.
+        spacing: length of edges.
+        smoothing: of directions, over the spacing.
+        settings: of the mesh.
+        first: number of the plan to begin with.
 
     Raises:
         NoMeshError: if none does.
     """
-    began = time.monotonic()
+    began = time.process_time()
     failure: FailedAttemptError | None = None
     number = 0
 
@@ -57,12 +68,13 @@ def mesh_component(
         triangles, carried = finer(spacing)
         return combed(triangles.frames, carried, lattice.symmetry, smoothing, settings.merging * spacing)
 
-    for plan, words in plans(spacing, smoothing, settings):
-        if number and (not settings.fallback or time.monotonic() - began > settings.time_limit):
+    for plan, words in itertools.islice(plans(spacing, smoothing, settings), first, None):
+        if number and (not settings.fallback or time.process_time() - began > settings.time_limit):
             break
         number += 1
         try:
-            return attempt(finer(plan.spacing)[0], graph(plan.spacing, plan.smoothing), lattice, plan, settings), words
+            made = attempt(finer(plan.spacing)[0], graph(plan.spacing, plan.smoothing), lattice, plan, settings)
+            return made, words, first + number - 1
         except FailedAttemptError as error:
             failure = error if failure is None or failure.vertex < 0 else failure
     assert failure is not None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import torch
 from torch import Tensor
 
@@ -73,8 +75,8 @@ def principal_quads(
     def sizing(at: float) -> CurvatureSizes:
         return curvature_sizes(surface.frames, surface.directions, at, chosen.spacing_range)
 
-    used = sizing if chosen.adaptive else None
-    pieces, size = mesh_to_count(surface, lattices, size, chosen, count, lambda made: len(made.faces), used)
+    laid = replace(surface, sizing=sizing) if chosen.adaptive else surface
+    pieces, size = mesh_to_count(laid, lattices, size, chosen, count, lambda made: len(made.faces))
     faces, positions = pieces.faces, torch.from_numpy(pieces.positions)
     made = verified_topology(faces, len(positions), surface.shape)
     report = measure(positions, made, surface, size, pieces.indices)

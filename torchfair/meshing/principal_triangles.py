@@ -8,7 +8,6 @@ import torch
 from torch import Tensor
 
 from .._graph import edge_numbers
-from ..fields import Directions
 from ..principal import PrincipalEdges
 from ..topology import Topology
 from .components import Pieces, mesh_to_count, read_surface, spacing_of
@@ -74,8 +73,12 @@ def principal_triangles(
         field = row_sizes(sizes.field, surface.frames, surface.directions, across, ratio, at)
         return CurvatureSizes(field, sizes.limited)
 
-    turned = replace(surface, fields=[_turned(of) for of in surface.fields]) if across else surface
-    pieces, size = mesh_to_count(turned, lattices, size, chosen, count, _triangles, sizing if chosen.adaptive else None)
+    laid = replace(
+        surface,
+        fields=[of.turned for of in surface.fields] if across else surface.fields,
+        sizing=sizing if chosen.adaptive else None,
+    )
+    pieces, size = mesh_to_count(laid, lattices, size, chosen, count, _triangles)
     triangles = cut_cells(pieces.positions, pieces.faces, pieces.rows)
     positions = torch.from_numpy(pieces.positions)
     made = verified_topology(triangles, len(positions), surface.shape)
@@ -96,10 +99,6 @@ def principal_triangles(
 
 def _triangles(pieces: Pieces) -> int:
     return sum(len(face) - 2 for face in pieces.faces)
-
-
-def _turned(directions: Directions) -> Directions:
-    return Directions(-directions.values, directions.means, directions.confidence)
 
 
 def _mask(topology: Topology, rows: set[tuple[int, int]]) -> Tensor:

@@ -29,7 +29,7 @@ class MeshingSettings:
             curvature k, rather than of one length.
         spacing_range: The longest of these lengths over the shortest, at most.
         fallback: Whether other settings are tried where these give no valid mesh; what was taken is said.
-        time_limit: No other settings are tried after so many seconds for a component.
+        time_limit: No other settings are tried after so many seconds of processor time for a component.
 
     Raises:
         SettingsError: a setting is out of its range; names it.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..fields import FaceFrames, connection_laplacian, hermitian_solver, turned_values
+from ..fields import FaceFrames, connection_laplacian, half_turns, hermitian_solver
 from ..fields.frames import Complexes, Floats, Ints
 
 
@@ -41,7 +41,7 @@ class SizeField:
 
     def carried(self, frames: FaceFrames, finer: FaceFrames, parents: Ints) -> SizeField:
         """On finer triangles, those of the triangles (F',) that they lie in."""
-        return SizeField(self.means[parents], turned_values(self.values, frames, finer, parents))
+        return SizeField(self.means[parents], self.values[parents] * half_turns(frames, finer, parents))
 
     def smoothed(self, frames: FaceFrames, length: float) -> SizeField:
         """Averaged over a length by a screened Poisson equation.
