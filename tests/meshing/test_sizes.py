@@ -118,7 +118,7 @@ def test_spacings_of_a_cylinder_are_long_along_it() -> None:
 def test_a_flat_surface_has_one_spacing() -> None:
     frames = frames_of(*irregular(Flat(), 300))
     count = len(frames.areas)
-    flat = Directions(np.zeros(count, complex), np.zeros(count), np.zeros(count))
+    flat = Directions(np.zeros((count, 3), complex), np.zeros(count), np.zeros(count))
     field = curvature_sizes(frames, flat, 0.1, 4.0).field
     assert field.largest == pytest.approx(0, abs=1e-12)
     assert field.smallest == pytest.approx(0, abs=1e-12)
@@ -186,7 +186,8 @@ def test_rows_are_as_far_apart_as_the_curvature_says(across: bool, sign: int) ->
     size, mean = (2.0, 1.0) if across else (2.0, -1.0)  # rows follow the curvature that is smaller in size
     there = np.angle(frames.first[:, 0] - 1j * frames.first[:, 1])  # the x-axis in the frames
     for difference, middle, expected in ((size, mean, math.sqrt(0.25 / 0.3)), (size, 3.0, EQUILATERAL)):
-        directions = Directions(difference * np.exp(2j * there), np.full(count, middle), np.ones(count))
+        values = np.tile(difference * np.exp(2j * there), (3, 1)).T
+        directions = Directions(values, np.full(count, middle), np.ones(count))
         one = SizeField(np.zeros(count), np.zeros(count, complex))
         found = row_sizes(one, frames, directions, across, 1.0, 0.1)
         x, y = found.along(there).T
