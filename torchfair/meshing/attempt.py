@@ -26,7 +26,7 @@ from .untangling import untangled
 from .verification import shape_of, verified_topology
 
 _ANISOTROPY = 30.0  # of the map: 1 triples the angles to directions, 300 wins little and stretches edges
-_UNTANGLED = 3  # maps, the best first
+_UNTANGLED = 2  # maps, the best first
 _SHORTEST_RUN = 1.5  # spacings
 
 

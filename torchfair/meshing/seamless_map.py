@@ -115,13 +115,12 @@ class MapProblem:
             return [self.map_of(optimum.base.copy())]
         near = _NEAR * float(np.median(self.density.prod(1))) ** -0.5
         between = real_form(gaps(self.frames, self.graph, self.seams, near))
-        sets = separate_vectors(optimum.metric, optimum.target, between @ optimum.moves, between @ optimum.base)
+        rows, offsets = between @ optimum.moves, between @ optimum.base
         found = []
-        for vectors in sets:
-            for vector in vectors.vectors[:_TRIED]:
-                found.append(self.map_of(optimum.base + optimum.moves @ vector))
-                if found[-1].is_sound:
-                    return [found[-1]]
+        for vector in separate_vectors(optimum.metric, optimum.target, rows, offsets)[:_TRIED]:
+            found.append(self.map_of(optimum.base + optimum.moves @ vector))
+            if found[-1].is_sound:
+                return [found[-1]]
         return sorted(found, key=badness)
 
     @property

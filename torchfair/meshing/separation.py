@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
 
-from ..fields.frames import FaceFrames, Floats, Ints
-from .closest_vectors import WholeVectors, closest_vectors
+from ..fields.frames import Bools, FaceFrames, Floats, Ints
+from .closest_vectors import closest_vectors
 from .cut_graph import CutGraph, dual_graph
 from .seams import ROTATIONS, Seams
 
@@ -73,8 +73,8 @@ def _gap(
     return terms
 
 
-def separate_vectors(metric: Floats, target: Floats, rows: Floats, offsets: Floats) -> list[WholeVectors]:
-    """Whole vectors close to a target, first those that keep pairs apart.
+def separate_vectors(metric: Floats, target: Floats, rows: Floats, offsets: Floats) -> Ints:
+    """Whole vectors (m, k) close to a target that keep pairs apart, the closest first; if there are none, any.
 
     Where two singular vertices would come to lie on one point, a step of one is asked for along the coordinate in
     which they are farther from each other at the target.
@@ -83,25 +83,26 @@ def separate_vectors(metric: Floats, target: Floats, rows: Floats, offsets: Floa
         metric: (k, k) positive definite, of eigenvalues up to 1.
         target: (k,).
         rows: (2n, k), and ``offsets`` (2n,): both coordinates of each gap are ``rows @ y + offsets``.
-
-    Returns:
-        One or two sets; the last is that without steps.
     """
-    plain = closest_vectors(metric, target)
+    vectors = closest_vectors(metric, target).vectors
     wanted = (rows @ target + offsets).reshape(-1, 2)
-    apart, stiff, right = plain, metric, metric @ target
+    stiff, right = metric, metric @ target
     done: set[int] = set()
     for _ in range(len(wanted)):
-        found = np.rint(rows @ apart.vectors[0] + offsets).reshape(-1, 2)
-        together = [pair for pair in np.flatnonzero(~found.any(1)).tolist() if pair not in done]
-        if not together:
+        new = set(np.flatnonzero(_together(rows, offsets, vectors[0])).tolist()) - done
+        if not new:
             break
-        for pair in together:
+        for pair in sorted(new):
             part = int(np.argmax(np.abs(wanted[pair])))
             row = rows[2 * pair + part]
             ahead = 1.0 if wanted[pair, part] >= 0 else -1.0
             stiff = stiff + _WEIGHT * np.outer(row, row)
             right = right + _WEIGHT * row * (ahead - offsets[2 * pair + part])
-            done.add(pair)
-        apart = closest_vectors(stiff, np.linalg.lstsq(stiff, right)[0])
-    return [apart, plain] if done else [plain]
+        done |= new
+        vectors = closest_vectors(stiff, np.linalg.lstsq(stiff, right)[0]).vectors
+    apart = np.array([not _together(rows, offsets, vector).any() for vector in vectors])
+    return vectors[apart] if apart.any() else vectors
+
+
+def _together(rows: Floats, offsets: Floats, vector: Ints) -> Bools:
+    return np.asarray(~np.rint(rows @ vector + offsets).reshape(-1, 2).any(1))
