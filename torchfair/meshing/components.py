@@ -16,8 +16,10 @@ from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
 from ..topology import Topology
+from .attempt import PieceMesh
 from .ladder import NoMeshError, mesh_component
 from .lattice import Lattice
+from .mesh_creases import MeshCreases
 from .settings import MeshingSettings
 from .surface import DesignSurface, components_of
 from .verification import Shape, shape_of
@@ -75,7 +77,7 @@ class ReadSurface:
 
 def read_surface(vertices: Tensor, topology: Topology, settings: MeshingSettings) -> ReadSurface:
     """The components of a mesh with their directions. Errors as of :func:`principal_quads`."""
-    parts = components_of(vertices, topology)
+    parts = components_of(vertices, topology, settings.crease_angle)
     found = [part.directions(settings.noise) for part in parts]
     notes = [
         f"{_name(number, len(parts))}the surface is rough: curvature fitted over {rings} rings"
@@ -109,6 +111,7 @@ class Pieces:
         positions: (V, 3).
         faces: vertices counterclockwise.
         rows: edges with the second coordinate constant, the smaller vertex first.
+        creases: edges along creases.
         places: (n, 3) singular points.
         indices: (n,) of the field.
         notes: what was changed, in words.
@@ -117,6 +120,7 @@ class Pieces:
     positions: Floats
     faces: list[list[int]]
     rows: set[tuple[int, int]]
+    creases: MeshCreases
     places: Tensor
     indices: Tensor
     notes: list[str]
@@ -128,22 +132,29 @@ def mesh_components(surface: ReadSurface, lattices: list[Lattice], spacing: floa
     Raises:
         NoMeshError: if one has no valid mesh.
     """
-    positions, faces, rows, places, indices, notes = [], [], set(), [], [], []
-    offset = 0
+    made: list[PieceMesh] = []
+    notes = []
     for number, (part, directions) in enumerate(zip(surface.parts, surface.fields, strict=True)):
         smoothing = settings.smoothing_length(surface.rings[number])
         mesh, words = mesh_component(part, directions, lattices[number], spacing, smoothing, settings)
         if words:
             name = _name(number, len(surface.parts))
             notes.append(f"{name}not as asked for, which gave no valid mesh: {words}")
-        positions.append(mesh.positions)
-        faces += [[node + offset for node in face] for face in mesh.faces]
-        rows |= {(a + offset, b + offset) for a, b in mesh.rows}
-        places.append(mesh.singular_places)
-        indices.append(mesh.singular_charges / 4)
-        offset += len(mesh.positions)
-    at = torch.from_numpy(np.concatenate(places))
-    return Pieces(np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes)
+        made.append(mesh)
+    offsets = np.cumsum([0, *(len(mesh.positions) for mesh in made[:-1])]).tolist()
+    both = list(zip(made, offsets, strict=True))
+    return Pieces(
+        np.concatenate([mesh.positions for mesh in made]),
+        [[node + offset for node in face] for mesh, offset in both for face in mesh.faces],
+        {(a + offset, b + offset) for mesh, offset in both for a, b in mesh.rows},
+        MeshCreases(
+            torch.from_numpy(np.concatenate([mesh.creases + offset for mesh, offset in both])),
+            torch.from_numpy(np.concatenate([mesh.sharp for mesh in made])),
+        ),
+        torch.from_numpy(np.concatenate([mesh.singular_places for mesh in made])),
+        torch.from_numpy(np.concatenate([mesh.singular_charges / 4 for mesh in made])),
+        notes,
+    )
 
 
 def mesh_to_count(
@@ -182,7 +193,8 @@ def mesh_to_count(
             again = mesh_components(surface, lattices, other, short)
         except NoMeshError:
             break
-        if abs(faces_of(again) / count - 1) >= abs(ratio - 1) or len(again.notes) > len(best.notes):
+        worse = len(again.notes) > len(best.notes) or len(again.creases.given) < len(best.creases.given)
+        if worse or abs(faces_of(again) / count - 1) >= abs(ratio - 1):
             break
         best, spacing = again, other
     return best, spacing
