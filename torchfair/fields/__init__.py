@@ -3,6 +3,7 @@
 Arrays of NumPy, without gradients: what :mod:`torchfair.meshing` is built on, not an interface for users.
 """
 
+from .direction_field import Pull as Pull
 from .direction_field import Symmetry as Symmetry
 from .direction_field import connection_laplacian as connection_laplacian
 from .direction_field import direction_field as direction_field

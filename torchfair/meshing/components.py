@@ -16,9 +16,11 @@ from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
 from ..topology import Topology
+from .attempt import PieceMesh
 from .curvature_sizes import CurvatureSizes
 from .ladder import NoMeshError, mesh_component
 from .lattice import Lattice
+from .mesh_creases import MeshCreases
 from .settings import MeshingSettings
 from .sizes import SizeField
 from .surface import DesignSurface, components_of
@@ -84,7 +86,7 @@ class ReadSurface:
 
 def read_surface(vertices: Tensor, topology: Topology, settings: MeshingSettings) -> ReadSurface:
     """The components of a mesh with their directions. Errors as of :func:`principal_quads`."""
-    parts = components_of(vertices, topology)
+    parts = components_of(vertices, topology, settings.crease_angle)
     found = [part.directions(settings.noise) for part in parts]
     notes = [
         f"{_name(number, len(parts))}the surface is rough: curvature fitted over {rings} rings"
@@ -118,6 +120,7 @@ class Pieces:
         positions: (V, 3).
         faces: vertices counterclockwise.
         rows: edges with the second coordinate constant, the smaller vertex first.
+        creases: edges along creases.
         places: (n, 3) singular points.
         indices: (n,) of the field.
         notes: what was changed, in words.
@@ -128,6 +131,7 @@ class Pieces:
     positions: Floats
     faces: list[list[int]]
     rows: set[tuple[int, int]]
+    creases: MeshCreases
     places: Tensor
     indices: Tensor
     notes: list[str]
@@ -154,8 +158,8 @@ def mesh_components(
     Raises:
         NoMeshError: if one has no valid mesh.
     """
-    positions, faces, rows, places, indices, notes, taken = [], [], set(), [], [], [], []
-    offset = 0
+    made: list[PieceMesh] = []
+    notes, taken = [], []
     sizes = surface.sizing and surface.sizing(spacing)
     parts = surface.parts if sizes is None else surface.sized(sizes.field)
     for number, (part, directions) in enumerate(zip(parts, surface.fields, strict=True)):
@@ -166,15 +170,22 @@ def mesh_components(
         if words:
             name = _name(number, len(surface.parts))
             notes.append(f"{name}not as asked for, which gave no valid mesh: {words}")
-        positions.append(mesh.positions)
-        faces += [[node + offset for node in face] for face in mesh.faces]
-        rows |= {(a + offset, b + offset) for a, b in mesh.rows}
-        places.append(mesh.singular_places)
-        indices.append(mesh.singular_charges / 4)
-        offset += len(mesh.positions)
-    at = torch.from_numpy(np.concatenate(places))
+        made.append(mesh)
+    offsets = np.cumsum([0, *(len(mesh.positions) for mesh in made[:-1])]).tolist()
+    both = list(zip(made, offsets, strict=True))
     return Pieces(
-        np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes, taken, sizes
+        np.concatenate([mesh.positions for mesh in made]),
+        [[node + offset for node in face] for mesh, offset in both for face in mesh.faces],
+        {(a + offset, b + offset) for mesh, offset in both for a, b in mesh.rows},
+        MeshCreases(
+            torch.from_numpy(np.concatenate([mesh.creases + offset for mesh, offset in both])),
+            torch.from_numpy(np.concatenate([mesh.sharp for mesh in made])),
+        ),
+        torch.from_numpy(np.concatenate([mesh.singular_places for mesh in made])),
+        torch.from_numpy(np.concatenate([mesh.singular_charges / 4 for mesh in made])),
+        notes,
+        taken,
+        sizes,
     )
 
 
@@ -214,7 +225,8 @@ def mesh_to_count(
             again = mesh_components(surface, lattices, other, short, best.plans)
         except NoMeshError:
             break
-        if abs(faces_of(again) / count - 1) >= abs(ratio - 1) or len(again.notes) > len(best.notes):
+        worse = len(again.notes) > len(best.notes) or len(again.creases.given) < len(best.creases.given)
+        if worse or abs(faces_of(again) / count - 1) >= abs(ratio - 1):
             break
         best, spacing = again, other
     return best, spacing

@@ -79,13 +79,14 @@ def principal_quads(
     pieces, size = mesh_to_count(laid, lattices, size, chosen, count, lambda made: len(made.faces))
     faces, positions = pieces.faces, torch.from_numpy(pieces.positions)
     made = verified_topology(faces, len(positions), surface.shape)
-    report = measure(positions, made, surface, size, pieces.indices)
+    report = measure(positions, made, surface, size, pieces.indices, pieces.creases)
     return QuadMesh(
         positions.to(vertices),
         made.to(vertices.device),
         pieces.places.to(vertices),
         pieces.indices.to(vertices),
         surface,
+        pieces.creases.to(vertices),
         {**report, **(pieces.sizes.report(size) if pieces.sizes else {})},
         [*surface.notes, *pieces.notes],
     )

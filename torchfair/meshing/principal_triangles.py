@@ -83,7 +83,8 @@ def principal_triangles(
     positions = torch.from_numpy(pieces.positions)
     made = verified_topology(triangles, len(positions), surface.shape)
     principal = PrincipalEdges(made, _mask(made, pieces.rows))
-    report = measure(positions, made, surface, size, pieces.indices, principal.mask[: made.num_interior_edges])
+    followed = principal.mask[: made.num_interior_edges]
+    report = measure(positions, made, surface, size, pieces.indices, pieces.creases, followed)
     if vertices.device.type != "cpu":
         made = made.to(vertices.device)
         principal = PrincipalEdges(made, principal.mask.to(vertices.device))
@@ -92,6 +93,7 @@ def principal_triangles(
         principal,
         pieces.places.to(vertices),
         pieces.indices.to(vertices),
+        pieces.creases.to(vertices),
         {**report, "row_distance": ratio, **(pieces.sizes.report(size) if pieces.sizes else {})},
         [*surface.notes, *pieces.notes],
     )

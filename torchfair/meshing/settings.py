@@ -23,8 +23,9 @@ class MeshingSettings:
         noise: Over how many rings of vertices curvature is fitted, from 2 on; ``"auto"`` finds it by the noise.
         merging: Singular vertices that are closer than this are merged, in edge lengths of the new mesh.
         align_boundary: Whether parts of the boundary that nearly follow a direction become lines of the mesh.
-        boundary_angle: How far they may turn from the direction, radians.
-        corner_angle: Boundary vertices that turn by more are corners and stay, radians.
+        boundary_angle: How far they, or creases, may turn from the direction, radians.
+        corner_angle: Vertices where the boundary or a crease turns by more are corners and stay, radians.
+        crease_angle: Edges that bend by more are creases, which are kept, radians; 0 for none.
         adaptive: Whether edges are shorter where the surface bends more, in proportion to ``1 / sqrt|k|`` across a
             curvature k, rather than of one length.
         spacing_range: The longest of these lengths over the shortest, at most.
@@ -41,6 +42,7 @@ class MeshingSettings:
     align_boundary: bool = True
     boundary_angle: float = setting(math.radians(12.0), unit="radians")
     corner_angle: float = setting(math.radians(40.0), unit="radians")
+    crease_angle: float = setting(math.radians(40.0), unit="radians")
     adaptive: bool = False
     spacing_range: float = 4.0
     fallback: bool = True
@@ -58,6 +60,7 @@ class MeshingSettings:
                 raise SettingsError(f"{name} must be True or False, got {getattr(self, name)!r}")
         check_number("boundary_angle", self.boundary_angle, most=math.pi / 4)
         check_number("corner_angle", self.corner_angle, above=True, most=math.pi)
+        check_number("crease_angle", self.crease_angle, most=math.pi)
         check_number("time_limit", self.time_limit)
 
     def smoothing_length(self, rings: int) -> float:
