@@ -64,7 +64,13 @@ def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Te
 
 
 def form_promises(
-    settings: FormSettings, before: Mapping[str, float], after: Mapping[str, float], *, handles: bool, normals: bool
+    settings: FormSettings,
+    before: Mapping[str, float],
+    after: Mapping[str, float],
+    *,
+    handles: bool,
+    normals: bool,
+    remesh: bool = False,
 ) -> list[Promise]:
     """What is asked of a mesh, and what its measures are.
 
@@ -74,6 +80,7 @@ def form_promises(
         after: Measures of the mesh.
         handles: Whether there are any.
         normals: Whether any are prescribed.
+        remesh: Whether triangles may be replaced.
     """
     edge, promises = before["mean_edge_length"], []
     if not (handles or normals or before["largest_boundary_distance"] > _ON_THE_CURVES * edge):
@@ -86,6 +93,7 @@ def form_promises(
     )
     least = min(math.degrees(settings.least_angle), 0.5 * before["smallest_angle_degrees"])
     remedy = "raise fairness, allow more iterations, or start from more even triangles"
+    remedy = remedy if remesh else f"let triangles be replaced (remesh), {remedy}"
     promises.append(
         Promise("smallest angle", least, after["smallest_angle_degrees"], "at least", "degrees", remedy=remedy)
     )
