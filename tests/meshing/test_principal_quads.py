@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -153,7 +154,7 @@ def test_the_mesh_does_not_depend_on_motion_scale_and_numbering() -> None:
     assert torch.cdist(found.singular_points, again.singular_points).amin(1).max() < 0.1 * found.report["spacing"]
 
 
-def test_a_finer_surface_is_no_other(tmp_path: object) -> None:
+def test_a_finer_surface_is_no_other() -> None:
     """A surface of few large triangles is cut finer: edges may be shorter than those of the surface."""
     vertices, topology = irregular(SADDLE, 150)
     found = principal_quads(vertices, topology, count=500)
@@ -207,7 +208,7 @@ def test_where_no_mesh_is_found_that_is_said_in_one_line() -> None:
     assert 0 <= caught.value.vertex < topology.num_vertices
 
 
-def test_a_moebius_strip_is_refused(tmp_path: object) -> None:
+def test_a_moebius_strip_is_refused(tmp_path: Path) -> None:
     turn = torch.arange(40) * 2 * math.pi / 40  # half a twist: the last rows meet crosswise
     rows = []
     for side in (-0.2, 0.2):
@@ -215,7 +216,7 @@ def test_a_moebius_strip_is_refused(tmp_path: object) -> None:
         rows += torch.stack([radius * turn.cos(), radius * turn.sin(), height], 1).tolist()
     last = [[39, 40, 0], [39, 0, 79]]
     faces = [[k, k + 1, k + 41] for k in range(39)] + [[k, k + 41, k + 40] for k in range(39)] + last
-    path = tmp_path / "strip.obj"  # type: ignore[operator]
+    path = tmp_path / "strip.obj"
     lines = ["v {} {} {}".format(*row) for row in rows]
     lines += ["f {} {} {}".format(*(number + 1 for number in face)) for face in faces]
     path.write_text("\n".join(lines) + "\n")
@@ -279,9 +280,9 @@ def test_verification_says_what_is_wrong() -> None:
         verified_topology([*faces, faces[0]], topology.num_vertices, wanted)
 
 
-def test_a_report_can_be_written(tmp_path: object) -> None:
+def test_a_report_can_be_written(tmp_path: Path) -> None:
     vertices, topology = irregular(SADDLE)
     found = principal_quads(vertices, topology, count=100)
-    path = tmp_path / "mesh.obj"  # type: ignore[operator]
+    path = tmp_path / "mesh.obj"
     save_mesh(path, found.vertices, found.topology)
     assert load_mesh(path).topology.num_faces == found.report["faces"]

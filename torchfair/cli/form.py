@@ -63,7 +63,7 @@ class FormCommand(JobCommand):
             "curve for a disk, two for an annulus, more for more holes; repeatable")  # fmt: skip
         add("--close", action="store_true", help="close open arcs by straight lines")
         add("--starts", type=positive_count, metavar="N", help="try so many surfaces to start from, and go on with the "
-            "best (default 6 from curves alone, 1 from a mesh)")  # fmt: skip
+            f"best (default {_STARTS} from curves alone, 1 from a mesh)")  # fmt: skip
         add("--vertices", type=positive_count, default=1000, metavar="N", help="size of a start made from curves "
             "(default 1000)")  # fmt: skip
         add("--through", nargs=3, action="append", default=[], type=float, metavar=("X", "Y", "Z"),

@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+from .._interrupts import deferred_interrupts
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
+    from ..io import PolygonMesh
     from ..meshing import QuadMesh
-    from ..topology import Topology
+    from ..projection import Status
 
 
-def made_planar(mesh: QuadMesh, surface: tuple[Tensor, Topology]) -> tuple[QuadMesh, list[str]]:
-    """The mesh with planar polygons near the surface, and what was not reached."""
-    from ..formfinding import PLANAR_QUADS, planar_quads
-    from ..progress import ProgressDisplay
+class PlanarMesh(NamedTuple):
+    """What became of a mesh that was to be made planar.
 
-    with ProgressDisplay(PLANAR_QUADS.projection.max_iterations) as display:
-        made, job = planar_quads(mesh, surface, callback=display)
-    return made, [str(promise) for promise in job.promises if not promise.holds]
+    Attributes:
+        mesh: with the report of the mesh before, under ``before_planar``, beside its own.
+        missed: what was not reached, in words.
+        status: how the solve ended.
+    """
+
+    mesh: QuadMesh
+    missed: list[str]
+    status: Status
+
+
+def made_planar(mesh: QuadMesh, surface: PolygonMesh) -> PlanarMesh:
+    """The mesh with planar polygons near the surface. Ctrl-C ends the solve, not the command: the best mesh is kept."""
+    with deferred_interrupts():
+        from ..formfinding import PLANAR_QUADS, planar_quads
+        from ..progress import ProgressDisplay
+
+        with ProgressDisplay(PLANAR_QUADS.projection.max_iterations) as display:
+            made, job = planar_quads(mesh, (surface.vertices, surface.topology), callback=display)
+    missed = [str(promise) for promise in job.promises if not promise.holds]
+    return PlanarMesh(made, missed, job.projection.status)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ LABELS = {
     "largest_coplanar": "largest residual of normals, relative",
     "largest_displacement": "largest displacement of a vertex",
     "mean_displacement": "... mean",
-    "largest_distance_from_start": "largest distance from the surface at the start, mean edges",
+    "largest_distance_from_start": "largest distance from where the surface was, mean edges",
     "changed_stars": "stars of another kind than at the start",
     "convex_stars": "convex stars",
     "good_saddles": "good saddles",
@@ -94,9 +94,10 @@ def missed_lines(result: JobResult[Any], asked_levels: int) -> list[str]:
     return lines
 
 
-def note_lines(notes: list[str], missed: list[str]) -> list[str]:
-    """Notes but those that are said at the end."""
-    return [f"note: {note}" for note in notes if not any(note.endswith(line) for line in missed)]
+def note_lines(repairs: Sequence[str], notes: Sequence[str], missed: Sequence[str]) -> list[str]:
+    """Repairs of the input, and notes but those that are said at the end."""
+    said = [f"note: {note}" for note in notes if not any(note.endswith(line) for line in missed)]
+    return [*(f"repaired: {sentence}" for sentence in repairs), *said]
 
 
 def _percent(before: float, after: float) -> str:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._ranges import ranges
 from ..errors import MeshError
 from ..fields.frames import Bools, Ints
-from .crossings import Crossings, left_corners, sorted_groups
+from .crossings import Crossings, sorted_groups
 from .seamless_map import SeamlessMap
 
 
@@ -95,7 +96,7 @@ def _changes(face: Ints, coordinate: Ints, level: Ints, order: Ints) -> np.ndarr
 def _border(found: SeamlessMap, crossings: Crossings) -> tuple[Ints, ...]:
     """Everything on the borders of triangles: face, side, rank along the side, node, and the line."""
     frames = found.frames
-    face, corner = left_corners(frames)
+    face, corner = frames.left_corners
     edge, count = crossings.edge, len(crossings.edge)
     number = np.arange(count)
     rank = number - crossings.offsets[edge] + 1
@@ -125,7 +126,7 @@ def find_lattice_points(chords: Chords, num_faces: int) -> LatticePoints:
     offsets = [np.cumsum(count) - count for count in counts]
     pairs = counts[0] * counts[1]
     face = np.repeat(np.arange(num_faces), pairs)
-    within = np.arange(len(face)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+    within = ranges(np.zeros_like(pairs), pairs)
     width = np.maximum(counts[1], 1)[face]
     a = by_face[0][offsets[0][face] + within // width] if len(face) else face
     b = by_face[1][offsets[1][face] + within % width] if len(face) else face

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..fields.frames import Bools, FaceFrames, Floats, Ints
+from .._ranges import ranges
+from ..fields.frames import Bools, Floats, Ints
 from .seamless_map import SeamlessMap
 from .seams import ROTATIONS
 
@@ -38,7 +39,7 @@ class Crossings:
 def find_crossings(found: SeamlessMap, values: np.ndarray) -> Crossings:
     """The crossings of a seamless map, for values of copies off the lines."""
     frames, at_corners = found.frames, values[found.seams.copies]
-    face, corner = left_corners(frames)
+    face, corner = frames.left_corners
     start, end = at_corners[face, corner], at_corners[face, (corner + 1) % 3]
     parts = [_levels(getattr(start, part), getattr(end, part)) for part in ("real", "imag")]
     edge, level, along = (np.concatenate([part[k] for part in parts]) for k in range(3))
@@ -74,25 +75,13 @@ def off_the_lines(found: SeamlessMap, inward: np.ndarray | None = None) -> np.nd
     return np.asarray(found.values + seams.unit * move[seams.vertex])
 
 
-def left_corners(frames: FaceFrames) -> tuple[Ints, Ints]:
-    """(E,) left face of every edge, boundary edges included, and its corner where the edge starts."""
-    topology = frames.topology
-    edge_of = topology.corner_edges.numpy()
-    outer = np.flatnonzero(edge_of >= topology.num_interior_edges)
-    face, corner = np.zeros((2, topology.num_edges), np.int64)
-    inner = topology.num_interior_edges
-    face[:inner], corner[:inner] = frames.faces[:, 0], frames.corners[:, 0]
-    face[edge_of[outer]], corner[edge_of[outer]] = outer // 3, outer % 3
-    return face, corner
-
-
 def _levels(start: Floats, end: Floats) -> tuple[Ints, Ints, Floats]:
     """Whole numbers strictly between values at starts and ends: edges, numbers, places along the edge."""
     low, high = np.minimum(start, end), np.maximum(start, end)
     first = np.floor(low).astype(np.int64) + 1
     counts = np.maximum(np.ceil(high).astype(np.int64) - first, 0)
     edge = np.repeat(np.arange(len(start)), counts)
-    level = np.repeat(first, counts) + np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+    level = ranges(first, counts)
     return edge, level, (level - start[edge]) / (end - start)[edge]
 
 

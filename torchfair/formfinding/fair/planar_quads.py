@@ -48,5 +48,6 @@ def planar_quads(
     job = minimise_normal_variation(
         mesh.vertices, mesh.topology, reference=surface, settings=PLANAR_QUADS, callback=callback
     )
-    report = {**measure_mesh_on(job.vertices, mesh, surface), "before_planar": mesh.report}
-    return replace(mesh, vertices=job.vertices, report=report, notes=[*mesh.notes, *job.notes]), job
+    report = {**measure_mesh_on(job.vertices, mesh), "before_planar": mesh.report}
+    solve = f"{job.steps} steps towards planar polygons: {job.message}"
+    return replace(mesh, vertices=job.vertices, report=report, notes=[*mesh.notes, *job.notes, solve]), job
