@@ -8,7 +8,8 @@ sizes      quads asked for and triangles of the surface, a free-form patch; ever
            largest memory is printed (targets: 2, 3 and 15 s for the first three; 4 GB; growth at most 1.3)
 surfaces   irregular triangles of analytic surfaces, and files beside the project if there are any; all sides get
            the same triangles and the same count, one after the other
-angle      degrees between inner edges and principal directions, mean and 95 %
+angle      degrees between inner edges and principal directions, mean and 95 %; none where edges are so short that
+           the surface is nearly flat over each of them
 E/C        may be below 1: edges along the boundary carry no energy, and shrunken meshes have less
 distance   of the middles of edges and faces from the surface, largest, in mean edges
 topology   whether Euler number and boundary loops are those of the surface
@@ -33,8 +34,11 @@ from meshing_peers import PEERS, PeerMesh, installed, run_peer
 from torch import Tensor
 
 from torchfair import Topology, TorchfairError
+from torchfair.geometry import edge_lengths
 from torchfair.io import load_mesh
-from torchfair.meshing import QuadMesh, measure_mesh_on, principal_quads
+from torchfair.meshing import MeshingSettings, principal_quads
+from torchfair.meshing.components import read_surface
+from torchfair.meshing.report import measure
 from torchfair.shapes import (
     Catenoid,
     Enneper,
@@ -44,6 +48,7 @@ from torchfair.shapes import (
     irregular_triangles,
     rotated_lattice,
 )
+from torchfair.triangulation import triangulate
 
 Mesh = tuple[Tensor, Topology]
 OURS = "torchfair"
@@ -75,7 +80,8 @@ def surface_of(name: str) -> Mesh:
         made = irregular_triangles(ANALYTIC[name], _VERTICES)
         return made.vertices, made.topology
     mesh = load_mesh(FOLDER / FILES[name])
-    return mesh.vertices, Topology.from_faces(mesh.topology.triangles, len(mesh.vertices))
+    triangles = triangulate(mesh.vertices, mesh.topology).triangles
+    return mesh.vertices, Topology.from_faces(triangles, len(mesh.vertices))
 
 
 def available() -> list[str]:
@@ -112,7 +118,8 @@ def growth(sizes: list[tuple[int, int]]) -> list[dict[str, object]]:
         limit = TIMES.get((quads, triangles))
         met = "" if limit is None else f"{limit:.0f} s: {verdict(row['seconds'] <= limit)}"
         print(f"{quads:>10}{row['faces']:>9}{row['triangles']:>11}{row['seconds']:9.2f}{row['memory']:6.2f} GB", end="")
-        print(f"{row['angle']:7.2f}  {met}{''.join(f'  ({note})' for note in row['notes'])}", flush=True)
+        angle = f"{row['angle']:7.2f}" if row["angle"] is not None else f"{'-':>7}"
+        print(f"{angle}  {met}{''.join(f'  ({note})' for note in row['notes'])}", flush=True)
     if len(rows) > 1:
         first, last = rows[-2], rows[-1]
         exponent = math.log(last["seconds"] / first["seconds"]) / math.log(last["triangles"] / first["triangles"])
@@ -152,10 +159,9 @@ def judged(mesh: PeerMesh | str, surface: Mesh) -> dict[str, object]:
         topology = mesh.quads if own else Topology.from_faces(torch.as_tensor(mesh.quads), len(vertices))
     except TorchfairError as error:
         return {"failure": f"no manifold ({error})", "seconds": mesh.seconds}
-    lengths = (vertices[topology.edges[:, 0]] - vertices[topology.edges[:, 1]]).norm(dim=1)
-    spacing = {"spacing": float(lengths.mean())}
-    shell = QuadMesh(vertices, topology, vertices[:0], vertices.new_zeros(0), spacing)
-    report = measure_mesh_on(vertices, shell, surface)
+    spacing = float(edge_lengths(vertices, topology).mean())
+    read = read_surface(*surface, MeshingSettings())
+    report = measure(vertices, topology, read, spacing, vertices.new_zeros(0))
     shape = surface[1]
     euler = shape.num_vertices - shape.num_edges + shape.num_faces
     same = report["euler_number"] == euler and report["boundary_loops"] == len(shape.boundary_loops())
