@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
+import torch
 from torch import Tensor
 
 from ...energies import angle_variation, normal_variation, total_absolute_curvature, total_mean_curvature
@@ -14,11 +15,9 @@ from ...geometry.closest_point import ReferenceSurface
 from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
 from ..job.promises import Promise, handle_promise
+from .problem import PLANAR_PROMISE, FairProblem
 
-if TYPE_CHECKING:
-    from .problem import FairProblem
-
-PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
+_OF_PANELS = "planarity of kept faces"
 FLAT_PROMISE = 0.02  # degrees between the faces at edges that are kept flat
 
 
@@ -77,7 +76,7 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
     if not problem.has_other_goals:
         promises.append(Promise("E", before["normal_variation"], after["normal_variation"]))
     if problem.near.limits is not None and not problem.near.design_mode:
-        most = max(settings.distance_limit or 0.0, before["largest_distance_relative"])
+        most = max(settings.distance_limit or 0.0, before["largest_distance_relative"], problem.distance_for_planarity)
         reached = after["largest_distance_relative"]
         remedy = "raise distance_limit, or pull less"
         promises.append(Promise("distance from the reference", most, reached, unit="mean edges", remedy=remedy))
@@ -91,7 +90,7 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         promises.append(Promise("faces turned over", 0.0, after["flipped_faces"]))
     if problem.planar_faces.numel() and settings.planarity_weight:
         remedy = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"
-        promises.append(Promise("planarity of kept faces", PLANAR_PROMISE, after["largest_planarity"], remedy=remedy))
+        promises.append(Promise(_OF_PANELS, PLANAR_PROMISE, after["largest_planarity"], remedy=remedy))
     if problem.flat_edges.numel() and settings.flat_weight:
         remedy = "let the boundary glide or be free, raise distance_limit, or let them fold: flat none"
         reached = after["largest_fold_degrees"]
@@ -101,6 +100,17 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         remedy = "faces would become too small or too thin; allow smaller angles and areas, or pull less"
         promises.append(handle_promise(away, edge, remedy=remedy))
     return promises
+
+
+def located(promises: Sequence[Promise], vertices: Tensor, problem: FairProblem) -> list[Promise]:
+    """The promises, with the panels of ``vertices`` (V, 3) named that are not planar as promised, the worst first."""
+    warps = planarity(vertices, problem.topology)[problem.planar_faces]
+    order = torch.argsort(warps, descending=True, stable=True)[: int((warps > PLANAR_PROMISE).sum())]
+    named = [
+        f"{face} ({warp:.2g})" for face, warp in zip(problem.planar_faces[order[:5]], warps[order[:5]], strict=True)
+    ]
+    where = f"{len(order)} of {len(warps)}, counted from 0: {', '.join(named)}" + ", ..." * (len(order) > 5)
+    return [replace(p, where=where) if p.name == _OF_PANELS and len(order) else p for p in promises]
 
 
 def _largest(values: Tensor) -> float:

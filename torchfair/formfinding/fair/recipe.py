@@ -8,13 +8,13 @@ from dataclasses import replace
 
 from torch import Tensor
 
-from ...projection import Callback
+from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ...topology import Topology
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference
 from .feature_curves import FeatureCurves
-from .measures import fair_measures, fair_promises
+from .measures import fair_measures, fair_promises, located
 from .plan import FairPlan
 from .problem import FairProblem, feature_curves
 from .refinement import refined
@@ -115,6 +115,11 @@ class FairRecipe(Recipe[FairSettings]):
     def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
         """See ``fair_promises``."""
         return fair_promises(self.problem, before, after)
+
+    def level(self, state: State, before: dict[str, float], runs: list[ProjectionResult], like: Tensor) -> Level:
+        """What is returned of a state, with the panels named that break promises."""
+        level = super().level(state, before, runs, like)
+        return replace(level, promises=located(level.promises, self.vertices(state), self.problem))
 
     def refined(self, state: State) -> FairRecipe:
         """By Loop's or Catmull and Clark's scheme, near the same reference surface."""

@@ -59,6 +59,8 @@ class FairSettings:
             three corners, ``"none"``, or face numbers.
         planar_tolerance: A polygon arrives planar when its diagonals are nearer than this fraction of its
             mean edge length.
+        planar_distance: Where faces cannot become planar within the distance limit, they may go so far from the
+            reference surface; 0 to keep the limit.
         planarity_weight: Weight of half the squared distance of diagonals.
         flat: Edges that stay flat: ``"keep"`` for the diagonals of panels that arrive as coplanar triangles, ``"all"``
             for all edges between triangles that arrive flat, ``"none"``, or numbers of interior edges. Coplanar
@@ -92,6 +94,7 @@ class FairSettings:
     crease_angle: float = setting(math.radians(40.0), unit="radians")
     planar: Planar | tuple[int, ...] = "keep"
     planar_tolerance: float = 1e-3
+    planar_distance: float = setting(0.5, unit="mean edges")
     planarity_weight: float = 1e6
     flat: Flat | tuple[int, ...] = "keep"
     flat_tolerance: float = 1e-3
@@ -164,7 +167,14 @@ class FairSettings:
             )
         if isinstance(self.flat, str) and self.flat not in get_args(Flat):
             raise SettingsError(f"flat must be one of {', '.join(get_args(Flat))} or edge numbers, got {self.flat!r}")
-        for name in ("smallest_angle", "smallest_area", "planar_tolerance", "flat_tolerance", "corner_angle"):
+        for name in (
+            "smallest_angle",
+            "smallest_area",
+            "planar_tolerance",
+            "planar_distance",
+            "flat_tolerance",
+            "corner_angle",
+        ):
             check_number(name, getattr(self, name))
         check_number("crease_angle", self.crease_angle, most=math.pi)
         check_number("smoothing", self.smoothing, above=True, finite=True)

@@ -19,6 +19,7 @@ class Promise:
         sense: ``"at most"`` or ``"at least"``.
         unit: Of both numbers, empty where there is none.
         remedy: What to change where it does not hold.
+        where: Which elements do not keep it, in words; empty where they all do, or where it is not known.
         slack: Relative allowance for rounding.
     """
 
@@ -28,6 +29,7 @@ class Promise:
     sense: Literal["at most", "at least"] = "at most"
     unit: str = ""
     remedy: str = ""
+    where: str = ""
     slack: float = 1e-6
 
     @property
@@ -43,7 +45,7 @@ class Promise:
         words = f"{self.name} {self.reached:.3g}{unit}, {self.sense} {self.asked:.3g} asked for"
         if self.holds:
             return words
-        return f"{words}: NOT REACHED" + (f"; {self.remedy}" if self.remedy else "")
+        return "; ".join(filter(None, (f"{words}: NOT REACHED", self.where, self.remedy)))
 
     def as_dict(self) -> dict[str, object]:
         """For reports."""
@@ -54,6 +56,7 @@ class Promise:
             "sense": self.sense,
             "unit": self.unit,
             "holds": self.holds,
+            "where": self.where,
         }
 
 
