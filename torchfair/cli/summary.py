@@ -25,6 +25,7 @@ LABELS = {
     "largest_boundary_distance": "largest distance from boundary curves",
     "largest_planarity": "largest planarity of kept polygons",
     "largest_planarity_of_all": "largest planarity of all polygons",
+    "largest_planarity_growth": "... growth of that of nearly planar ones",
     "largest_fold_degrees": "largest fold of edges kept flat, degrees",
     "largest_tilt_degrees": "largest angle to a prescribed tangent plane, degrees",
     "largest_cospherical": "largest residual of spheres, relative",

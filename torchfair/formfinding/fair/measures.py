@@ -17,6 +17,7 @@ from ...normalisation import Normalisation
 from ..job.promises import Promise, handle_promise
 from .problem import PLANAR_PROMISE, FairProblem
 
+_FREER = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"
 _OF_PANELS = "planarity of kept faces"
 FLAT_PROMISE = 0.02  # degrees between the faces at edges that are kept flat
 
@@ -33,7 +34,8 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         ``largest_boundary_distance`` of gliding vertices from their curve. ``smallest_angle_degrees``;
         ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces`` against the start. ``largest_planarity``
         of the faces kept planar and ``largest_planarity_of_all`` polygons (diagonal distance over mean edge of the
-        face). ``largest_fold_degrees`` of the edges kept flat. ``largest_handle_distance``.
+        face), ``largest_planarity_growth`` of those that are nearly planar. ``largest_fold_degrees`` of the edges kept
+        flat. ``largest_handle_distance``.
     """
     topology = problem.topology
     normalised = unit.apply(vertices)
@@ -64,6 +66,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "flipped_faces": int((turned <= 0.0).sum()),
         "largest_planarity": _largest(warps[problem.planar_faces]),
         "largest_planarity_of_all": _largest(warps[topology.face_sizes > 3]),
+        "largest_planarity_growth": max(0.0, _largest(problem.nearly_planar.growth(vertices, topology))),
         "largest_fold_degrees": math.degrees(_largest(problem.folds(vertices))),
         "largest_handle_distance": unit.length * _largest(problem.pulls.away(normalised)),
     }
@@ -89,8 +92,12 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
     if not problem.near.design_mode:
         promises.append(Promise("faces turned over", 0.0, after["flipped_faces"]))
     if problem.planar_faces.numel() and settings.planarity_weight:
-        remedy = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"
-        promises.append(Promise(_OF_PANELS, PLANAR_PROMISE, after["largest_planarity"], remedy=remedy))
+        promises.append(Promise(_OF_PANELS, PLANAR_PROMISE, after["largest_planarity"], remedy=_FREER))
+    if problem.nearly_planar.faces.numel():
+        growth = after["largest_planarity_growth"]
+        promises.append(
+            Promise("growth of the planarity of nearly planar faces", PLANAR_PROMISE, growth, remedy=_FREER)
+        )
     if problem.flat_edges.numel() and settings.flat_weight:
         remedy = "let the boundary glide or be free, raise distance_limit, or let them fold: flat none"
         reached = after["largest_fold_degrees"]

@@ -24,7 +24,7 @@ from .flat_edges import edges_to_keep_flat
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
-from .planar_faces import faces_to_keep_planar
+from .planar_faces import NearlyPlanar, faces_to_keep_planar
 from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)
@@ -57,6 +57,7 @@ class FairProblem:
         input_edge: Mean edge length of the input.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
         planar_faces: (n,) faces that are kept planar.
+        nearly_planar: Faces that do not become less planar.
         loose: (V,) bool, corners of boundary and creases that become planar faces may take along.
         flat_edges: (n,) interior edges that are kept flat.
         most_warped: Relative planarity that no face may exceed that should be planar but cannot become so.
@@ -83,6 +84,7 @@ class FairProblem:
         self.corners = self._curves.rim.corners
         self._tell_of_creases()
         self.planar_faces = self._planar_faces()
+        self.nearly_planar = self._nearly_planar()
         self.loose = self._loose_corners()
         self.flat_edges = self._flat_edges()
         self.boundary = self._gliding_boundary()
@@ -165,6 +167,7 @@ class FairProblem:
             *self._quality(),
             *self.pulls.terms(weight=settings.handle_weight),
             *c.planarity_terms(self.topology, self.planar_faces, weight=_raised(settings.planarity_weight, share)),
+            *self.nearly_planar.terms(self.topology, weight=_raised(settings.planarity_weight, share)),
             *self._flat(share),
             *self._directions(),
         ]
@@ -200,6 +203,8 @@ class FairProblem:
         warped = planarity(vertices, self.topology)[self.planar_faces]
         settings, folded = self.settings, self.folds(vertices)
         if settings.planarity_weight and bool((warped > _PLANAR_ENOUGH).any()):
+            return False
+        if bool((self.nearly_planar.growth(vertices, self.topology) > _PLANAR_ENOUGH).any()):
             return False
         return not settings.flat_weight or not bool((folded > _FLAT_ENOUGH).any())
 
@@ -265,6 +270,19 @@ class FairProblem:
             self.notes.append(f"{faces.numel()} of {self.topology.num_faces} faces {words}")
         return faces
 
+    def _nearly_planar(self) -> NearlyPlanar:
+        settings = self.settings
+        found = NearlyPlanar.of(self.vertices, self.topology, settings, self.planar_faces)
+        if not found.faces.numel() or not settings.planarity_weight:
+            return found.none()
+        keeps = settings.planar == "keep"
+        words = "do not become less planar" if keeps else "are let go"
+        self.notes.append(
+            f"{found.faces.numel()} nearly planar faces (within {settings.planar_reach:g}, at most "
+            f"{float(found.most.max()):.2g}) {words}"
+        )
+        return found if keeps else found.none()
+
     def _loose_corners(self) -> Tensor:
         """Those of faces that are to become planar: where all their corners stayed, few could."""
         settings, topology = self.settings, self.topology
@@ -327,7 +345,7 @@ class FairProblem:
         if not glides and not self._curves.points:
             return None
         beside = self.topology.interior_edge_faces[self.flat_edges].reshape(-1)
-        panels = torch.cat([self.planar_faces, beside])
+        panels = torch.cat([self.planar_faces, self.nearly_planar.faces, beside])
         loose = self.topology.corners[torch.isin(self.topology.corner_faces, panels)]
         held = (self.topology.is_boundary_vertex & glides) | self._curves.on_creases
         return GlidingBoundary(held, self._curves.curves(boundary=glides), self.pulls, loose)

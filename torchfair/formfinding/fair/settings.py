@@ -59,6 +59,7 @@ class FairSettings:
             three corners, ``"none"``, or face numbers.
         planar_tolerance: A polygon arrives planar when its diagonals are nearer than this fraction of its
             mean edge length.
+        planar_reach: With ``"keep"``, polygons that are nearly planar, by less than this, do not become less so.
         planar_distance: Where faces cannot become planar within the distance limit, they may go so far from the
             reference surface; 0 to keep the limit.
         planarity_weight: Weight of half the squared distance of diagonals.
@@ -94,6 +95,7 @@ class FairSettings:
     crease_angle: float = setting(math.radians(40.0), unit="radians")
     planar: Planar | tuple[int, ...] = "keep"
     planar_tolerance: float = 1e-3
+    planar_reach: float = 5e-3
     planar_distance: float = setting(0.5, unit="mean edges")
     planarity_weight: float = 1e6
     flat: Flat | tuple[int, ...] = "keep"
