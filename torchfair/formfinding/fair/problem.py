@@ -21,9 +21,11 @@ from ..job.pulls import Pulls
 from ..references import GivenReference
 from .feature_curves import FeatureCurves
 from .flat_edges import edges_to_keep_flat
+from .free_boundary import FreeBoundary
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
+from .panel_sizes import growth_terms, own_sizes
 from .planar_faces import NearlyPlanar, faces_to_keep_planar
 from .settings import FairSettings
 
@@ -51,6 +53,7 @@ class FairProblem:
         settings: Weights and bounds.
         rim: Curves along boundary and creases, normalised; by default those of the start.
         input_edge: Mean edge length of the input, in which the distance limit is given; that of the start is 1.
+        near_input: Whether the reference is the input; by default where none is given.
 
     Attributes:
         near: Closeness to the reference surface.
@@ -76,10 +79,12 @@ class FairProblem:
         *,
         rim: FeatureCurves | None = None,
         input_edge: float = 1.0,
+        near_input: bool | None = None,
     ) -> None:
         self.vertices, self.topology, self.pulls, self.settings = vertices, topology, pulls, settings
         self.notes: list[str] = []
         self._has_other_reference, self.has_other_goals = reference is not None, False
+        self.near_input = reference is None if near_input is None else near_input
         self.input_edge, self._curves = input_edge, rim or feature_curves(vertices, topology, settings)
         self.corners = self._curves.rim.corners
         self._tell_of_creases()
@@ -88,6 +93,7 @@ class FairProblem:
         self.loose = self._loose_corners()
         self.flat_edges = self._flat_edges()
         self.boundary = self._gliding_boundary()
+        self._free = FreeBoundary(vertices, topology, self._curves, pulls)
         self.most_warped, self.distance_for_planarity = math.inf, 0.0
         limit = settings.distance_limit
         self.near = Nearness(
@@ -360,11 +366,12 @@ class FairProblem:
         return [*terms, *self._curves.fairness_terms(self.topology, weight=weight)]
 
     def _boundary(self) -> list[ElementTerm]:
+        free = self._free.terms(weight=self.settings.free_boundary_weight) if self.settings.boundary == "free" else []
         if self.boundary is None or self.boundary.feet is None:
-            return []
+            return free
         gliding = c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight)
         weights = self.boundary.glides.to(self.vertices)
-        return [replace(term, element_weights=weights) for term in gliding]
+        return [*free, *(replace(term, element_weights=weights) for term in gliding)]
 
     def _loosely(self) -> list[ElementTerm]:
         """Draws corners that may move to where they were."""
@@ -376,13 +383,23 @@ class FairProblem:
         settings = self.settings
         angles, smallest = corner_angles(self.vertices, self.topology), self._smallest_angle
         safe = angles.clamp(max=max(_SAFE_ANGLE, 2.0 * smallest)).clamp_min(smallest + _LEAST_SAFETY)
-        weight = settings.quality_weight
+        weight, most = settings.quality_weight, self.largest_areas
         return [
+            *([] if most is None else growth_terms(self.topology, most, weight=weight)),
             *c.corner_angle_terms(self.topology, smallest, safe, weight=weight),
             *c.face_area_terms(
                 self.topology, face_areas(self.vertices, self.topology), smallest=settings.smallest_area, weight=weight
             ),
         ]
+
+    @property
+    def largest_areas(self) -> Tensor | None:
+        """(F,) that no face exceeds; handles may stretch faces as they need."""
+        settings = self.settings
+        if not (settings.quality_weight and settings.largest_area) or self.pulls.everywhere:
+            return None
+        bounded = settings.largest_area < math.inf and not bool(self.pulls.pulled.any())
+        return settings.largest_area * own_sizes(self.vertices, self.topology) if bounded else None
 
     @cached_property
     def _smallest_angle(self) -> float:
@@ -418,7 +435,9 @@ class FairProblem:
             self.placed,
             smallest_angle=bounded * self._smallest_angle,
             smallest_area=bounded * self.settings.smallest_area,
+            largest_areas=self.largest_areas,
             from_last=self.near.design_mode or self.pulls.everywhere,
+            may_turn=self.pulls.everywhere,
         )
 
 
