@@ -25,6 +25,7 @@ from .verification import Shape, shape_of
 _CORRECTIONS = 2
 _SHARE = 1 / 6  # of the time limit, for a correction
 _COUNT_TOLERANCE = 0.08
+_FAR = 0.25  # beyond that other settings are taken for the sake of the count
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +200,9 @@ def mesh_to_count(
             again = mesh_components(surface, lattices, other, short, best.plans)
         except NoMeshError:
             break
-        if abs(faces_of(again) / count - 1) >= abs(ratio - 1) or len(again.notes) > len(best.notes):
+        if abs(faces_of(again) / count - 1) >= abs(ratio - 1):
+            break
+        if len(again.notes) > len(best.notes) and abs(ratio - 1) <= _FAR:
             break
         best, spacing = again, other
     return best, spacing

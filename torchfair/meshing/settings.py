@@ -10,7 +10,7 @@ from .._numbers import check_count, check_number
 from ..errors import SettingsError
 from ..settings import setting
 
-_NOISY = 4  # rings
+_SHORTEST = 1 / 16  # smoothing length in edges, where curvature is fitted over two rings
 
 
 @dataclass(frozen=True)
@@ -18,8 +18,8 @@ class MeshingSettings:
     """What :func:`principal_quads` and :func:`principal_triangles` take for a surface. One setting serves all.
 
     Attributes:
-        smoothing: Length over which directions are smoothed, in edge lengths of the new mesh; ``"auto"`` takes a
-            quarter, and one where there is noise.
+        smoothing: Length over which directions are smoothed, in edge lengths of the new mesh; ``"auto"`` takes
+            1/16, and more where there is noise: it grows with the square of the rings, up to one.
         noise: Over how many rings of vertices curvature is fitted, from 2 on; ``"auto"`` finds it by the noise.
         merging: Singular vertices that are closer than this are merged, in edge lengths of the new mesh.
         align_boundary: Whether parts of the boundary that nearly follow a direction become lines of the mesh.
@@ -57,5 +57,5 @@ class MeshingSettings:
     def smoothing_length(self, rings: int) -> float:
         """Over how many edge lengths directions are smoothed, where curvature is averaged over so many rings."""
         if self.smoothing == "auto":
-            return 0.25 if rings < _NOISY else 1.0
+            return min(_SHORTEST * (rings / 2) ** 2, 1.0)
         return float(self.smoothing)
