@@ -98,14 +98,14 @@ def test_handles_come_and_go_without_new_index_maps() -> None:
     vertices, topology, handle = annulus(120)
     session = Session(FormRecipe(vertices, topology), live=True)
     dragged(session, handle, 0.1 * UP, 1)
-    (_, problem), *others = session._problems.values()
+    problem, *others = session._problems.all()
     assert not others
     session.hold([handle])
     held = session.vertices[handle]
     other = handle + 7
     dragged(session, other, 0.1 * UP, 2)
     assert torch.equal(session.vertices[handle], held)
-    ((_, later),) = session._problems.values()
+    (later,) = session._problems.all()
     assert later.structure.shares_pattern(problem.structure)
     session.solve()  # also along normals
     session.free([other])

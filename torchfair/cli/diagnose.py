@@ -228,9 +228,8 @@ def _instructive(diagnosis: Diagnosis, worst: list[dict[str, Any]]) -> list[int]
     classes = diagnosis.classes
     chosen = [row["vertex"] for row in worst[:2]]
     convex = classes.is_kind(StarKind.CONVEX) & ~classes.flat
-    bad = classes.is_kind(StarKind.SADDLE) & ~classes.good
-    neither = classes.is_kind(StarKind.NEITHER)
-    for mask, most in ((bad, 3), (classes.good, 5), (convex, 6), (neither | bad | convex, 6), (diagnosis.inner, 6)):
+    masks = ((classes.bad_saddles, 3), (classes.good, 5), (convex, 6), (classes.bad | convex, 6), (diagnosis.inner, 6))
+    for mask, most in masks:
         found = torch.nonzero(mask).squeeze(1)
         others = [v for v in found[:: max(1, len(found) // 12)].tolist() if v not in chosen]
         chosen += others[: max(0, most - len(chosen))]

@@ -21,11 +21,15 @@ IN_WORDS = (
 )
 
 
-def exit_code(status: Status | None, missed: Sequence[str]) -> int:
-    """That of a job that ended with a status, if it solved anything, and missed some promises."""
+def exit_code(status: Status | None, missed: Sequence[str], *, interrupted: bool = False) -> int:
+    """That of a job that ended with a status, if it solved anything, and missed some promises.
+
+    ``interrupted`` says whether what came after the solve was.
+    """
     if status is not None:
         from ..projection import Status
 
-        if status is Status.INTERRUPTED:
-            return EXIT_INTERRUPTED
+        interrupted = interrupted or status is Status.INTERRUPTED
+    if interrupted:
+        return EXIT_INTERRUPTED
     return EXIT_NOT_REACHED if missed else EXIT_OK

@@ -79,7 +79,7 @@ class FairCommand(JobCommand):
             "levels": arguments.levels,
         }
         mesh = read_input(arguments.input, arguments.repair)
-        marks, notes = read_marks(mesh, arguments.input)
+        marks, notes = read_marks(mesh, arguments)
         return Request(mesh, options, notes=notes, marks=marks)
 
 

@@ -98,15 +98,16 @@ class JobCommand(ABC):
         outputs.make_folders()
         result = self._solve(request, settings)
         outputs.write_mesh(request, result)
-        missed = missed_lines(result, getattr(arguments, "levels", 0))
+        missed = [*missed_lines(result, getattr(arguments, "levels", 0)), *request.missed]
         lines = [
             *note_lines(request.mesh.repairs, [*request.notes, *result.notes], missed),
             *measures_table(result.before, result.after),
             *kept_lines(result),
             *work_lines(result),
+            *outputs.lines(),
         ]
         outputs.finish(request, result, lines, self._report(arguments, request, result, settings), missed)
-        return exit_code(result.projection.status, missed)
+        return exit_code(result.projection.status, missed, interrupted=request.interrupted)
 
     def _solve(self, request: Request, settings: Any) -> JobResult[Any]:
         from ..progress import ProgressDisplay

@@ -84,7 +84,8 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Reads, measures, prints."""
     from ..geometry import ReferenceSurface
-    from ..measuring import curvature_doubts, fold_measures, measure_mesh, measure_stationarity, worst_edges
+    from ..measuring import curvature_doubts, measure_mesh, measure_stationarity, worst_edges
+    from ..self_intersections import self_intersections
 
     if arguments.per_vertex and not (arguments.json and arguments.reference):
         raise CommandError("--per-vertex gives lists with --json and --reference only", NAME)
@@ -95,7 +96,9 @@ def run(arguments: argparse.Namespace) -> int:
         stationarity = measure_stationarity(mesh.vertices, mesh.topology, ReferenceSurface(*reference))
         quantities += stationarity.quantities()
         lists = {"per_vertex": stationarity.per_vertex()} if arguments.per_vertex else {}
-    doubts = curvature_doubts(fold_measures(mesh.vertices.double(), mesh.topology))
+    measures = {quantity.key: quantity.value or 0.0 for quantity in quantities}
+    meetings = len(self_intersections(mesh.vertices, mesh.topology))
+    doubts = curvature_doubts({**measures, "self_intersections": meetings})
     worst = worst_edges(mesh.vertices, mesh.topology, arguments.worst)
     if arguments.json:
         entries = {

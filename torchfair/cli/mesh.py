@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .arguments import positive_count
+from .edge_marks import file_of_marks
 from .errors import CommandError
 from .exit_codes import IN_WORDS, exit_code
 from .inputs import add_repair, read_input
@@ -85,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.planar and arguments.triangles:
         raise CommandError("--planar is for --quads: triangles are planar")
     settings = options().settings(arguments)
-    outputs = MeshOutputs(arguments, {"mesh.png": _singular, "edges.png": _edges})
+    outputs = MeshOutputs(arguments, {"mesh.png": draw_singular, "edges.png": _edges})
     outputs.prepare()
     surface = read_input(arguments.input, arguments.repair)
     outputs.make_folders()
@@ -97,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
         made, missed, status = made_planar(made, surface)
     request = Request(surface, {})
     outputs.write_mesh(request, made)
-    lines = [*note_lines(surface.repairs, made.notes, missed), *_table(made.report)]
+    lines = [*note_lines(surface.repairs, made.notes, missed), *table(made.report)]
     report = _report(arguments, made, settings, missed, time.perf_counter() - began)
     outputs.finish(request, made, lines, report, missed)
     return exit_code(status, missed)
@@ -116,8 +117,9 @@ class MeshOutputs(Outputs):
 
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
         super().__init__(arguments, pictures)
-        if arguments.triangles and self.mesh.suffix.lower() != ".obj":
-            self.beside = {self.mesh.with_suffix(".edges.json"): _labels}
+        beside = file_of_marks(self.mesh)
+        if arguments.triangles and beside is not None:
+            self.beside = {beside: _labels}
 
     def polylines(self, result: Any) -> Any:
         """Principal edges, unless they stand in a file beside."""
@@ -130,7 +132,8 @@ def _labels(path: Path, request: Request, result: Any, overwrite: bool) -> None:
     save_edge_labels(path, result.topology, result.principal.mask, overwrite=overwrite)
 
 
-def _singular(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+def draw_singular(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+    """Writes the picture of a principal mesh."""
     from ..viewing import picture_principal_edges, picture_principal_mesh
 
     if hasattr(result, "principal"):
@@ -147,7 +150,8 @@ def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
     picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
 
 
-def _table(report: Mapping[str, Any]) -> list[str]:
+def table(report: Mapping[str, Any]) -> list[str]:
+    """What was measured on a principal mesh, one line for each."""
     width = max(map(len, _ROWS.values()))
     lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items()]
     found = ", ".join(f"{count} of index {index}" for index, count in report["singular"].items())

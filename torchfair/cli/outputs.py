@@ -31,6 +31,8 @@ class Request:
         marks: Marked edges (E,) of the mesh, which go with it; None for none.
         settings: To solve with; by default those that options ask for.
         report: Entries of ``report.json`` beside those that all jobs have.
+        missed: What was asked for beside the job and is not there, in words.
+        interrupted: Whether what comes after the job was interrupted.
     """
 
     mesh: PolygonMesh
@@ -40,6 +42,8 @@ class Request:
     settings: Any = None
     marks: Tensor | None = None
     report: dict[str, Any] = field(default_factory=dict)
+    missed: list[str] = field(default_factory=list)
+    interrupted: bool = False
 
 
 Writer = Callable[[Path, Any, Any, bool], object]
@@ -94,6 +98,10 @@ class Outputs:
     def polylines(self, result: Any) -> Sequence[Tensor]:
         """Vertices of line elements of an OBJ file."""
         return ()
+
+    def lines(self) -> list[str]:
+        """What is said of what was written beside the mesh."""
+        return []
 
     def write_others(self, report: Mapping[str, Any], request: Request, result: Any) -> None:
         """Writes the rest."""

@@ -31,7 +31,7 @@ LABELS = {
     "largest_coplanar": "largest residual of normals, relative",
     "largest_displacement": "largest displacement of a vertex",
     "mean_displacement": "... mean",
-    "largest_distance_from_start": "largest distance from the surface at the start, mean edges",
+    "largest_distance_from_start": "largest distance from where the surface was, mean edges",
     "changed_stars": "stars of another kind than at the start",
     "convex_stars": "convex stars",
     "good_saddles": "good saddles",

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .._ranges import ranges
 from ..errors import MeshFileError
 from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
-from .text import Words, check_text, quote, ranges, split_words, to_floats, to_ints
+from .text import Words, check_text, quote, split_words, to_floats, to_ints
 from .text_rows import face_lines, vertex_lines
 
 _SKIPPED = frozenset(

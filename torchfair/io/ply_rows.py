@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .._ranges import ranges
 from ..errors import MeshFileError
 from .ply_header import Element
 from .raw_mesh import Ints
-from .text import Words, ranges, to_floats, to_ints
+from .text import Words, to_floats, to_ints
 
 Numbers = npt.NDArray[Any]  # in the type of the file
 Column = tuple[Numbers, Ints]

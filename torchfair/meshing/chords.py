@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._ranges import ranges
 from ..errors import MeshError
 from ..fields.frames import Bools, Ints
 from .crossings import Crossings, sorted_groups
@@ -125,7 +126,7 @@ def find_lattice_points(chords: Chords, num_faces: int) -> LatticePoints:
     offsets = [np.cumsum(count) - count for count in counts]
     pairs = counts[0] * counts[1]
     face = np.repeat(np.arange(num_faces), pairs)
-    within = np.arange(len(face)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+    within = ranges(np.zeros_like(pairs), pairs)
     width = np.maximum(counts[1], 1)[face]
     a = by_face[0][offsets[0][face] + within // width] if len(face) else face
     b = by_face[1][offsets[1][face] + within % width] if len(face) else face

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._ranges import ranges
 from ..fields.frames import Bools, Floats, Ints
 from .seamless_map import SeamlessMap
 from .seams import ROTATIONS
@@ -80,7 +81,7 @@ def _levels(start: Floats, end: Floats) -> tuple[Ints, Ints, Floats]:
     first = np.floor(low).astype(np.int64) + 1
     counts = np.maximum(np.ceil(high).astype(np.int64) - first, 0)
     edge = np.repeat(np.arange(len(start)), counts)
-    level = np.repeat(first, counts) + np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+    level = ranges(first, counts)
     return edge, level, (level - start[edge]) / (end - start)[edge]
 
 

@@ -11,7 +11,6 @@ import torch
 from torch import Tensor
 
 from ... import constraints as c
-from ...boundary import boundary_corners
 from ...geometry import corner_angles, dihedral_angles, face_areas
 from ...geometry.planarity import planarity
 from ...projection import ElementTerm, ProjectionSettings
@@ -20,7 +19,7 @@ from ...topology import Topology
 from ..job.plan import Stage
 from ..job.pulls import Pulls
 from ..references import GivenReference
-from .boundary_curves import BoundaryCurves
+from .feature_curves import FeatureCurves
 from .flat_edges import edges_to_keep_flat
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
@@ -48,7 +47,7 @@ class FairProblem:
         reference: Surface to stay close to, normalised, a mesh or a function; by default the start.
         pulls: Handles and held vertices.
         settings: Weights and bounds.
-        rim: Curves along the boundary, normalised; by default through the boundary of the start.
+        rim: Curves along boundary and creases, normalised; by default those of the start.
         input_edge: Mean edge length of the input, in which the distance limit is given; that of the start is 1.
 
     Attributes:
@@ -57,7 +56,7 @@ class FairProblem:
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
         planar_faces: (n,) faces that are kept planar.
         flat_edges: (n,) interior edges that are kept flat.
-        boundary: Curves on which boundary vertices glide; None if they do not.
+        boundary: Curves on which vertices of the boundary and of creases glide; None if none do.
         notes: Decisions taken, in words.
     """
 
@@ -69,14 +68,15 @@ class FairProblem:
         pulls: Pulls,
         settings: FairSettings,
         *,
-        rim: BoundaryCurves | None = None,
+        rim: FeatureCurves | None = None,
         input_edge: float = 1.0,
     ) -> None:
         self.vertices, self.topology, self.pulls, self.settings = vertices, topology, pulls, settings
         self.notes: list[str] = []
         self._has_other_reference, self.has_other_goals = reference is not None, False
-        self.input_edge, self._rim = input_edge, rim or boundary_curves(vertices, topology, settings)
-        self.corners = self._rim.corners
+        self.input_edge, self._curves = input_edge, rim or feature_curves(vertices, topology, settings)
+        self.corners = self._curves.rim.corners
+        self._tell_of_creases()
         self.planar_faces = self._planar_faces()
         self.flat_edges = self._flat_edges()
         self.boundary = self._gliding_boundary()
@@ -182,14 +182,14 @@ class FairProblem:
     # ---- decisions -------------------------------------------------------------------------------------
 
     def stays(self) -> Tensor:
-        """(V,) bool, vertices that do not move: the boundary or its corners, unless they are pulled; isolated ones."""
+        """(V,) bool, vertices that do not move unless pulled: the boundary or its corners, corners of creases."""
         isolated = self.topology.valences == 0
         kinds = {
             "glide": self.topology.is_boundary_vertex & self.corners,
             "fixed": self.topology.is_boundary_vertex.clone(),
             "free": torch.zeros_like(isolated),
         }
-        fixed = kinds[self.settings.boundary] | isolated
+        fixed = kinds[self.settings.boundary] | isolated | (self._curves.corners & ~self.topology.is_boundary_vertex)
         return fixed & ~self.pulls.pulled
 
     def _planar_faces(self) -> Tensor:
@@ -197,6 +197,15 @@ class FairProblem:
         if faces.numel() and isinstance(self.settings.planar, str):
             self.notes.append(f"{faces.numel()} of {self.topology.num_faces} faces are kept planar")
         return faces
+
+    def _tell_of_creases(self) -> None:
+        count, stay = int((self._curves.edges >= 0).sum()), int(self._curves.stay.sum())
+        if count:
+            degrees = math.degrees(self.settings.crease_angle)
+            self.notes.append(
+                f"{count} edges are creases, of more than {degrees:.3g} degrees: their vertices glide on them and "
+                f"{stay} corners stay; 0 degrees for no creases"
+            )
 
     def _flat_edges(self) -> Tensor:
         edges = edges_to_keep_flat(self.vertices, self.topology, self.settings)
@@ -235,20 +244,23 @@ class FairProblem:
         return c.edge_direction_terms(self.vertices, self.topology, every, weight=self.settings.direction_weight)
 
     def _gliding_boundary(self) -> GlidingBoundary | None:
-        if self.settings.boundary != "glide":
+        glides = self.settings.boundary == "glide"
+        if not glides and not self._curves.points:
             return None
         beside = self.topology.interior_edge_faces[self.flat_edges].reshape(-1)
         panels = torch.cat([self.planar_faces, beside])
-        return GlidingBoundary(self.topology, self._rim, self.pulls, panels)
+        loose = self.topology.corners[torch.isin(self.topology.corner_faces, panels)]
+        held = (self.topology.is_boundary_vertex & glides) | self._curves.on_creases
+        return GlidingBoundary(held, self._curves.curves(boundary=glides), self.pulls, loose)
 
     def _fairness(self) -> list[ElementTerm]:
         weight = self.settings.fairness_weight
         if self.settings.second_differences:
             return c.polyline_fairness_terms(self.topology, weight=weight, corners=self.corners)
         terms = c.interior_fairness_terms(self.topology, weight=weight)
-        if self.boundary is not None:
+        if self.settings.boundary == "glide":
             terms += c.boundary_fairness_terms(self.topology, self.corners, weight=weight)
-        return terms
+        return [*terms, *self._curves.fairness_terms(self.topology, weight=weight)]
 
     def _boundary(self) -> list[ElementTerm]:
         if self.boundary is None or self.boundary.feet is None:
@@ -310,6 +322,8 @@ def _raised(weight: float, share: float) -> float:
     return max(weight, 1.0) ** share if weight else 0.0
 
 
-def boundary_curves(vertices: Tensor, topology: Topology, settings: FairSettings) -> BoundaryCurves:
-    """Through the boundary of a mesh (V, 3), with corners where the settings see them."""
-    return BoundaryCurves.through(vertices, topology, boundary_corners(vertices, topology, settings.corner_angle))
+def feature_curves(vertices: Tensor, topology: Topology, settings: FairSettings) -> FeatureCurves:
+    """Along boundary and creases of a mesh (V, 3), with creases and corners where the settings see them."""
+    return FeatureCurves.through(
+        vertices, topology, corner_angle=settings.corner_angle, crease_angle=settings.crease_angle
+    )

@@ -13,10 +13,10 @@ from ...projection.layout import State
 from ...topology import Topology
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference
-from .boundary_curves import BoundaryCurves
+from .feature_curves import FeatureCurves
 from .measures import fair_measures, fair_promises
 from .plan import FairPlan
-from .problem import FairProblem, boundary_curves
+from .problem import FairProblem, feature_curves
 from .refinement import refined
 from .settings import FairSettings
 
@@ -27,7 +27,7 @@ class FairRecipe(Recipe[FairSettings]):
     Args:
         vertices, topology, reference, settings: See :func:`minimise_normal_variation`.
         handles: Likewise; more of them may be pulled later.
-        rim: Curves along the boundary; by default through the boundary of the start.
+        rim: Curves along boundary and creases; by default those of the start.
         input_edge: Mean edge length in which the distance limit is given; by default that of the start.
 
     Attributes:
@@ -44,13 +44,13 @@ class FairRecipe(Recipe[FairSettings]):
         reference: GivenReference | None = None,
         handles: Mapping[int, Sequence[float]] | None = None,
         settings: FairSettings | None = None,
-        rim: BoundaryCurves | None = None,
+        rim: FeatureCurves | None = None,
         input_edge: float | None = None,
     ) -> None:
         super().__init__(vertices, topology, settings or FairSettings())
         surface = None if reference is None else normalised_reference(reference, self.unit)
         self.reference = reference or (self.given, self.topology)
-        self.rim = rim or boundary_curves(self.given, self.topology, self.settings)
+        self.rim = rim or feature_curves(self.given, self.topology, self.settings)
         self.input_edge = input_edge or self.unit.length
         self.problem = FairProblem(
             self.start,

@@ -53,6 +53,8 @@ class FairSettings:
         boundary_weight: Weight of half the squared distance from the boundary curves. In the result gliding vertices
             lie on them exactly, but for those of faces that are kept planar.
         corner_angle: The boundary has a corner where it turns by more than this, radians.
+        crease_angle: Interior edges with a dihedral angle above this are creases, whose vertices slide on smooth curves
+            and whose corners stay, radians; 0 for no creases.
         planar: ``"keep"`` for the polygons that arrive planar, ``"quads"`` for all polygons with more than
             three corners, ``"none"``, or face numbers.
         planar_tolerance: A polygon arrives planar when its diagonals are nearer than this fraction of its
@@ -87,6 +89,7 @@ class FairSettings:
     boundary: Boundary = "glide"
     boundary_weight: float = 1e4
     corner_angle: float = setting(math.radians(40.0), unit="radians")
+    crease_angle: float = setting(math.radians(40.0), unit="radians")
     planar: Planar | tuple[int, ...] = "keep"
     planar_tolerance: float = 1e-3
     planarity_weight: float = 1e6
@@ -119,9 +122,9 @@ class FairSettings:
 
         The paper's variables; ``w_reg |X - X_prev|^2`` with constant ``w_reg``; every step taken; plain second
         differences; tangent planes of the reference and of the boundary; ``l* = 0`` for the diagonals of panels, with
-        equal normals; no barriers, limits, guards or stages. What is promised is measured all the same. Constraints
-        have weight 1. E enters as ``2 delta^2 mu^2``, which is ``l l*`` where constraints hold; the paper's quadratic
-        form ``l l*`` is indefinite.
+        equal normals; no creases, barriers, limits, guards or stages. What is promised is measured all the same.
+        Constraints have weight 1. E enters as ``2 delta^2 mu^2``, which is ``l l*`` where constraints hold; the paper's
+        quadratic form ``l l*`` is indefinite.
 
         Args:
             w_reg: Of the squared change of the unknowns in a step.
@@ -140,6 +143,7 @@ class FairSettings:
             second_differences=True,
             handle_weight=w_handle,
             boundary_weight=w_prox,
+            crease_angle=0.0,
             planarity_weight=0.0,
             flat_weight=1.0,
             quality_weight=0.0,
@@ -162,6 +166,7 @@ class FairSettings:
             raise SettingsError(f"flat must be one of {', '.join(get_args(Flat))} or edge numbers, got {self.flat!r}")
         for name in ("smallest_angle", "smallest_area", "planar_tolerance", "flat_tolerance", "corner_angle"):
             check_number(name, getattr(self, name))
+        check_number("crease_angle", self.crease_angle, most=math.pi)
         check_number("smoothing", self.smoothing, above=True, finite=True)
         factors = self.continuation if isinstance(self.continuation, Iterable) else (self.continuation,)
         if not all(is_number(factor) and 1.0 < factor < math.inf for factor in factors):

@@ -81,7 +81,7 @@ class FormRecipe(Recipe[FormSettings]):
     def plan(self, state: State) -> Plan:
         """Along normals with decreasing smoothing, then in space; from several starts where there are some."""
         self._follower.forget()
-        far = bool(self.pulls.pulled.any()) and float(self.pulls.away(state["vertices"]).max()) > FAR
+        far = self.pulls.farthest(state["vertices"]) > FAR
         if self._nearby or self.settings.formulation == "lifted" or not (self._starts > 1 or far):
             return FormPlan(self.problem, state, nearby=self._nearby)
         given = Start("as given", state["vertices"])
@@ -125,8 +125,12 @@ class FormRecipe(Recipe[FormSettings]):
         return self._on_the_rim(vertices) if self.problem.glides else vertices
 
     def before(self) -> dict[str, float]:
-        """Measures of the input, before its boundary is moved onto the curves."""
-        return self.measures(self._input)
+        """Measures of the input, before its boundary is moved onto the curves; notes where it runs through itself."""
+        measures = self.measures(self._input)
+        if measures["self_intersections"] and not self._nearby:
+            count = measures["self_intersections"]
+            self.notes.append(f"the start runs through itself: {count} pair(s) of faces meet")
+        return measures
 
     def measures(self, vertices: Tensor) -> dict[str, float]:
         """See ``form_measures``."""
