@@ -16,6 +16,7 @@ from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
 from ..topology import Topology
+from .curved_surface import on_curved_surface
 from .ladder import NoMeshError, mesh_component
 from .lattice import Lattice
 from .settings import MeshingSettings
@@ -53,6 +54,10 @@ class ReadSurface:
         faces = [part.topology.triangles + int(offset) for part, offset in zip(self.parts, offsets, strict=False)]
         vertices = torch.cat([part.vertices for part in self.parts])
         return vertices, Topology.from_faces(torch.cat(faces), len(vertices))
+
+    def curved(self, points: Tensor) -> Tensor:
+        """Points on the triangles, moved onto a smooth surface through their vertices."""
+        return on_curved_surface(points, *self.whole, min(self.rings))
 
     @cached_property
     def frames(self) -> FaceFrames:
@@ -206,6 +211,15 @@ def mesh_to_count(
             break
         best, spacing = again, other
     return best, spacing
+
+
+def on_surface(pieces: Pieces, surface: ReadSurface, settings: MeshingSettings) -> Pieces:
+    """Pieces with vertices and singular points where the settings want them: on the curved surface or on triangles."""
+    if not settings.curved:
+        return pieces
+    moved = surface.curved(torch.cat([torch.from_numpy(pieces.positions), pieces.places]))
+    positions, places = moved.split([len(pieces.positions), len(pieces.places)])
+    return replace(pieces, positions=positions.numpy(), places=places)
 
 
 def _name(number: int, count: int) -> str:

@@ -14,7 +14,7 @@ from ..fields import Directions
 from ..fields.frames import FaceFrames, Floats
 from ..principal import PrincipalEdges
 from ..topology import Topology
-from .components import Pieces, mesh_to_count, read_surface, spacing_of
+from .components import Pieces, mesh_to_count, on_surface, read_surface, spacing_of
 from .cut_cells import cut_cells
 from .lattice import triangle_lattice
 from .report import measure
@@ -37,7 +37,7 @@ def principal_triangles(
 ) -> TriangleMesh:
     r"""A lattice of triangles of which one edge in three follows principal curvature lines.
 
-    Its vertices lie on the surface, in rows along principal curvature lines, each shifted by half an edge against the
+    Its vertices lie on a smooth surface through those given, in rows along principal curvature lines, each shifted by half an edge against the
     next; inside all have valence 6 but for singular points of index 1/2 (valence 3) and -1/2 (valence 9). It is what
     :func:`torchfair.formfinding.principal_symmetric` starts from.
 
@@ -75,6 +75,7 @@ def principal_triangles(
     turned = replace(surface, fields=[of.turned for of in surface.fields]) if across else surface
     pieces, size = mesh_to_count(turned, lattices, size, chosen, count, _triangles)
     triangles = cut_cells(pieces.positions, pieces.faces, pieces.rows)
+    pieces = on_surface(pieces, surface, chosen)
     positions = torch.from_numpy(pieces.positions)
     made = verified_topology(triangles, len(positions), surface.shape)
     principal = PrincipalEdges(made, _mask(made, pieces.rows))

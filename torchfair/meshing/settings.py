@@ -25,6 +25,8 @@ class MeshingSettings:
         align_boundary: Whether parts of the boundary that nearly follow a direction become lines of the mesh.
         boundary_angle: How far they may turn from the direction, radians.
         corner_angle: Boundary vertices that turn by more are corners and stay, radians.
+        curved: Whether vertices lie on a smooth surface through those given, which bends as its curvature is found,
+            not on its flat triangles.
         fallback: Whether other settings are tried where these give no valid mesh; what was taken is said.
         time_limit: No other settings are tried after so many seconds of processor time for a component.
 
@@ -38,6 +40,7 @@ class MeshingSettings:
     align_boundary: bool = True
     boundary_angle: float = setting(math.radians(12.0), unit="radians")
     corner_angle: float = setting(math.radians(40.0), unit="radians")
+    curved: bool = True
     fallback: bool = True
     time_limit: float = setting(40.0, unit="seconds")
 
@@ -47,7 +50,7 @@ class MeshingSettings:
         if self.noise != "auto":
             check_count("noise (or 'auto')", self.noise, least=2)
         check_number("merging", self.merging, finite=True)
-        for name in ("align_boundary", "fallback"):
+        for name in ("align_boundary", "curved", "fallback"):
             if not isinstance(getattr(self, name), bool):
                 raise SettingsError(f"{name} must be True or False, got {getattr(self, name)!r}")
         check_number("boundary_angle", self.boundary_angle, most=math.pi / 4)
