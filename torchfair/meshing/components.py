@@ -18,6 +18,7 @@ from ..fields.frames import Floats
 from ..topology import Topology
 from .attempt import PieceMesh
 from .curvature_sizes import CurvatureSizes
+from .curved_surface import on_curved_surface
 from .ladder import NoMeshError, mesh_component
 from .lattice import Lattice
 from .mesh_creases import MeshCreases
@@ -29,6 +30,7 @@ from .verification import Shape, shape_of
 _CORRECTIONS = 2
 _SHARE = 1 / 6  # of the time limit, for a correction
 _COUNT_TOLERANCE = 0.08
+_FAR = 0.25  # beyond that other settings are taken for the sake of the count
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +54,13 @@ class ReadSurface:
     @cached_property
     def whole(self) -> tuple[Tensor, Topology]:
         """Triangles of all components in order."""
-        if len(self.parts) == 1:
-            return self.parts[0].vertices, self.parts[0].topology
-        offsets = np.cumsum([0, *(part.topology.num_vertices for part in self.parts)])
-        faces = [part.topology.triangles + int(offset) for part, offset in zip(self.parts, offsets, strict=False)]
-        vertices = torch.cat([part.vertices for part in self.parts])
-        return vertices, Topology.from_faces(torch.cat(faces), len(vertices))
+        return _together([(part.vertices, part.topology) for part in self.parts])
+
+    def curved(self, points: Tensor) -> Tensor:
+        """Points on the triangles, moved onto a smooth surface through their vertices, smooth but for creases."""
+        smooth = [part.frames.cut_along(part.sharp) if part.sharp.any() else part.frames for part in self.parts]
+        apart = _together([(torch.from_numpy(of.points), of.topology) for of in smooth])
+        return on_curved_surface(points, *apart, min(self.rings))
 
     @cached_property
     def frames(self) -> FaceFrames:
@@ -225,12 +228,36 @@ def mesh_to_count(
             again = mesh_components(surface, lattices, other, short, best.plans)
         except NoMeshError:
             break
-        worse = len(again.notes) > len(best.notes) or len(again.creases.given) < len(best.creases.given)
-        if worse or abs(faces_of(again) / count - 1) >= abs(ratio - 1):
+        if len(again.creases.given) < len(best.creases.given) or abs(faces_of(again) / count - 1) >= abs(ratio - 1):
+            break
+        if len(again.notes) > len(best.notes) and abs(ratio - 1) <= _FAR:
             break
         best, spacing = again, other
     return best, spacing
 
 
+def on_surface(pieces: Pieces, surface: ReadSurface, settings: MeshingSettings) -> Pieces:
+    """Pieces with vertices and singular points where the settings want them: on the curved surface or on triangles.
+
+    Those on creases stay.
+    """
+    if not settings.curved:
+        return pieces
+    flat, on_creases = torch.from_numpy(pieces.positions), pieces.creases.edges.flatten()
+    moved = surface.curved(torch.cat([flat, pieces.places]))
+    positions, places = moved[: len(flat)].index_copy(0, on_creases, flat[on_creases]), moved[len(flat) :]
+    return replace(pieces, positions=positions.numpy(), places=places)
+
+
 def _name(number: int, count: int) -> str:
     return f"component {number + 1}: " if count > 1 else ""
+
+
+def _together(meshes: list[tuple[Tensor, Topology]]) -> tuple[Tensor, Topology]:
+    """Triangles of meshes as one mesh, in order."""
+    if len(meshes) == 1:
+        return meshes[0]
+    offsets = np.cumsum([0, *(topology.num_vertices for _, topology in meshes)])
+    faces = [topology.triangles + int(offset) for (_, topology), offset in zip(meshes, offsets, strict=False)]
+    vertices = torch.cat([points for points, _ in meshes])
+    return vertices, Topology.from_faces(torch.cat(faces), len(vertices))

@@ -17,7 +17,7 @@ from .lattice import Lattice
 from .settings import MeshingSettings
 from .surface import DesignSurface
 
-_SMOOTHER = (1.0, 4.0, 16.0)  # times the smoothing length
+_SMOOTHER = (1.0, 4.0, 16.0, 64.0)  # times the smoothing length
 _SPACINGS = (1.0, 0.967, 1.037, 0.934, 1.08)  # counts up and down by 7 and 15 %
 
 

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ..topology import Topology
-from .components import mesh_to_count, read_surface, spacing_of
+from .components import mesh_to_count, on_surface, read_surface, spacing_of
 from .curvature_sizes import CurvatureSizes, curvature_sizes
 from .lattice import SQUARES
 from .quad_mesh import QuadMesh
@@ -27,7 +27,7 @@ def principal_quads(
 ) -> QuadMesh:
     """A quad mesh of a surface whose edges follow its principal curvature lines.
 
-    Its vertices lie on the surface. Inside all faces are quads, which meet in fours but for the singular points of the
+    Its vertices lie on a smooth surface through those given. Inside all faces are quads, which meet in fours but for the singular points of the
     principal directions; at the boundary cells are clipped to polygons. Euler number, boundary loops, components and
     orientation are those of the surface. Components are meshed one by one with the same spacing.
 
@@ -77,6 +77,7 @@ def principal_quads(
 
     laid = replace(surface, sizing=sizing) if chosen.adaptive else surface
     pieces, size = mesh_to_count(laid, lattices, size, chosen, count, lambda made: len(made.faces))
+    pieces = on_surface(pieces, surface, chosen)
     faces, positions = pieces.faces, torch.from_numpy(pieces.positions)
     made = verified_topology(faces, len(positions), surface.shape)
     report = measure(positions, made, surface, size, pieces.indices, pieces.creases)

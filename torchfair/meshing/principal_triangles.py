@@ -10,7 +10,7 @@ from torch import Tensor
 from .._graph import edge_numbers
 from ..principal import PrincipalEdges
 from ..topology import Topology
-from .components import Pieces, mesh_to_count, read_surface, spacing_of
+from .components import Pieces, mesh_to_count, on_surface, read_surface, spacing_of
 from .curvature_sizes import CurvatureSizes, curvature_sizes
 from .cut_cells import cut_cells
 from .lattice import triangle_lattice
@@ -31,7 +31,7 @@ def principal_triangles(
 ) -> TriangleMesh:
     r"""A lattice of triangles of which one edge in three follows principal curvature lines.
 
-    Its vertices lie on the surface, in rows along principal curvature lines, each shifted by half an edge against the
+    Its vertices lie on a smooth surface through those given, in rows along principal curvature lines, each shifted by half an edge against the
     next; inside all have valence 6 but for singular points of index 1/2 (valence 3) and -1/2 (valence 9). It is what
     :func:`torchfair.formfinding.principal_symmetric` starts from.
 
@@ -80,6 +80,7 @@ def principal_triangles(
     )
     pieces, size = mesh_to_count(laid, lattices, size, chosen, count, _triangles)
     triangles = cut_cells(pieces.positions, pieces.faces, pieces.rows)
+    pieces = on_surface(pieces, surface, chosen)
     positions = torch.from_numpy(pieces.positions)
     made = verified_topology(triangles, len(positions), surface.shape)
     principal = PrincipalEdges(made, _mask(made, pieces.rows))
