@@ -104,10 +104,10 @@ def judge(vertices: Tensor, topology: Topology, centre: Tensor) -> Report:
     folded = pyramid_self_intersections(vertices, topology) > 0
     report: Report = {kind: {"faces": 0, "simple": 0, "hexagons": []} for kind in KINDS}
     report |= {"one_sided": int(dual.one_sided.sum()), "faces": len(dual.mesh_vertices), "disagree": 0}
-    sizes = dual.topology.face_sizes
+    sizes, faces = dual.topology.face_sizes, dual.topology.face_lists()
     for size in sizes.unique().tolist():
         chosen = torch.nonzero(sizes == size).squeeze(1)
-        corners = torch.stack([torch.tensor(dual.topology.face_lists()[face]) for face in chosen.tolist()])
+        corners = torch.tensor([faces[face] for face in chosen.tolist()])
         polygons = flattened(dual.vertices[corners])
         numbers = dual.mesh_vertices[chosen]
         simple = is_simple(polygons)

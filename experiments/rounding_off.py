@@ -28,7 +28,7 @@ from torch import Tensor
 
 from torchfair import Topology, TorchfairError
 from torchfair.energies import total_absolute_curvature
-from torchfair.geometry import dihedral_angles, dual_edge_lengths, nuclear_norms
+from torchfair.geometry import dihedral_angles, dual_edge_lengths, edge_lengths, nuclear_norms
 from torchfair.shapes import (
     Paraboloid,
     PrincipalParaboloid,
@@ -156,7 +156,7 @@ def measure(config: Config, b: float) -> Report:
         vertices = mesh.vertices
         topology = Topology.from_faces(triangulate(vertices, mesh.topology).triangles, len(vertices))
         lengths = in_window(vertices, topology)
-        edge = float(torch.linalg.vector_norm(vertices[topology.edges].diff(dim=1), dim=-1).mean())
+        edge = float(edge_lengths(vertices, topology).mean())
         angles = float((lengths * dihedral_angles(vertices, topology).abs()).sum())
         rounded = []
         for radius in config.radii:

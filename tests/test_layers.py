@@ -17,7 +17,7 @@ FLOORS = (
     {"topology"},
     {"_graph"},
     {"_one_mesh", "boundary", "geometry", "polylines", "repair", "triangulation"},
-    {"_exact_triangles", "curves", "energies", "io", "normalisation", "shapes", "subdivision"},
+    {"_exact_triangles", "creases", "curves", "energies", "io", "normalisation", "shapes", "subdivision"},
     {"fields", "principal", "reflection", "self_intersections", "stars"},
     {"constraints", "measuring", "meshing", "viewing"},
     {"formfinding"},

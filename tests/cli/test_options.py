@@ -117,16 +117,37 @@ def test_faults_of_options_and_files_are_command_errors(tmp_path: Path) -> None:
     for words, message in (
         (["--boundary", "loose"], "--boundary: expected one of glide, fixed, free, got 'loose'"),
         (["--corner-angle", "200"], "--corner-angle: expected degrees from 0 to 180"),
-        (["--distance", "-1"], "distance_limit .* above 0, got -1.0"),
-        (["--fairness", "-1"], "fairness_weight=-1.0"),
-        (["--continuation", "3,1"], "continuation must hold finite factors above 1"),
-        (["--iterations", "-1"], "max_iterations must be a whole number"),
+        (["--distance", "-1"], "^--distance .* above 0, got -1.0"),
+        (["--fairness", "-1"], ": --fairness=-1.0"),
+        (["--continuation", "3,1"], "^--continuation must hold finite factors above 1"),
+        (["--iterations", "-1"], "^--iterations must be a whole number"),
     ):
         with pytest.raises(CommandError, match=message):
             parse(fair.COMMAND, *words)
+    with pytest.raises(CommandError, match=r"^--smoothing .* at most --coarse-smoothing, got"):
+        parse(form.COMMAND, "--smoothing", "0.9", "--coarse-smoothing", "0.1")
     (tmp_path / "mine.json").write_text('{"boundary": "loose"}')
     with pytest.raises(CommandError, match=r"mine\.json: boundary: expected one of glide"):
         parse(fair.COMMAND, "--settings", str(tmp_path / "mine.json"))
+    (tmp_path / "mine.json").write_text('{"fairness_weight": -1.0}')
+    with pytest.raises(CommandError, match=r"mine\.json: .*: fairness_weight=-1.0"):
+        parse(fair.COMMAND, "--settings", str(tmp_path / "mine.json"), "--fairness", "2")
+
+
+def test_what_is_asked_for_by_options_files_and_presets(tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text('{"evenness_weight": 0.0, "smallest_angle_degrees": 5, "projection": {"patience": 9}}')
+    parser, options = CommandParser(prog="x"), symmetric.COMMAND.options()
+    options.add_to(parser)
+    for words, names in (
+        ([], set()),
+        (["--free"], {"free"}),
+        (["--settings", str(path)], {"evenness_weight", "smallest_angle", "projection.patience"}),
+        (["--settings", str(path), "--iterations", "3"], {"evenness_weight", "smallest_angle", "projection.patience",
+            "projection.max_iterations"}),
+        (["--preset", "paper"], set(fields_of(symmetric.COMMAND.settings()))),
+    ):  # fmt: skip
+        assert set(options.asked(parser.parse_args(words))) == names
 
 
 @pytest.mark.parametrize("command", JOBS[:3])

@@ -11,7 +11,7 @@ from torchfair import Topology
 from torchfair.boundary import boundary_corners
 from torchfair.energies import normal_variation, total_absolute_curvature
 from torchfair.formfinding import FairSettings, minimise_normal_variation
-from torchfair.formfinding.fair.boundary_curves import BoundaryCurves
+from torchfair.formfinding.boundary_curves import BoundaryCurves
 from torchfair.formfinding.fair.recipe import FairRecipe
 from torchfair.formfinding.fair.refinement import _unfolded
 from torchfair.geometry import dihedral_angles, edge_lengths

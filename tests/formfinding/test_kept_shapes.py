@@ -13,7 +13,7 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.formfinding import Session, SymmetricRecipe, SymmetricSettings, principal_symmetric
 from torchfair.formfinding.symmetric.changes import Changes
-from torchfair.geometry import ReferenceSurface, edge_lengths
+from torchfair.geometry import ReferenceSurface, edge_lengths, face_areas
 from torchfair.measuring import diagnose_mesh
 from torchfair.principal import PrincipalEdges, principal_edges_from_directions, principal_edges_of_lattice
 from torchfair.shapes import Catenoid, Enneper, Hyperboloid, PrincipalParaboloid, Torus, principal_triangles
@@ -92,6 +92,18 @@ def test_free_shapes_go_farther_and_promise_less() -> None:
     assert len(free.promises) == len(kept.promises) - 2
 
 
+def test_a_mesh_that_collapses_says_so() -> None:
+    """The paper's second differences shrink what nothing holds."""
+    vertices, edges = STARTS["Enneper u"]()
+    result = principal_symmetric(vertices, edges, settings=SymmetricSettings.paper())
+    share = float(face_areas(result.vertices, result.topology).sum() / face_areas(vertices, edges.topology).sum())
+    (promise,) = (promise for promise in result.promises if promise.name.startswith("area"))
+    assert promise.reached == pytest.approx(share)
+    assert share < 0.5
+    assert not promise.holds
+    assert "fix vertices" in str(promise)
+
+
 def test_a_start_that_is_right_stays() -> None:
     vertices, edges = lattice(Torus(2.0, 1.0), "u", 10, 14)
     result = principal_symmetric(vertices, edges)
@@ -107,10 +119,16 @@ def test_a_lattice_across_the_directions_says_what_it_could_not_keep() -> None:
     assert any("E/C" in note and "NOT REACHED" in note for note in result.notes)
 
 
-def test_finer_levels_keep_the_shape_of_their_start() -> None:
-    vertices, edges = STARTS["uneven saddle"]()
+@pytest.mark.parametrize("name", ["coarse torus", pytest.param("uneven saddle", marks=pytest.mark.slow)])
+def test_finer_levels_keep_the_shape_of_their_start(name: str) -> None:
+    """Loop subdivision alone would shrink the tube of the torus at every level."""
+    vertices, edges = lattice(Torus(2.0, 1.0), "v", 8, 10) if name == "coarse torus" else STARTS[name]()
     result = principal_symmetric(vertices, edges, levels=1)
     assert len(result.levels) == 2
+    areas = [float(face_areas(mesh.vertices, mesh.topology).sum()) for mesh in result.levels]
+    assert areas[1] > 0.99 * areas[0] > 0.85 * result.before["area"]
+    assert result.after["area"] == pytest.approx(areas[1])
+    assert result.holds
     for level in result.levels:
         assert level.after["largest_distance_from_start"] < 0.1
         assert max(level.after["largest_cospherical"], level.after["largest_coplanar"]) < 1e-8

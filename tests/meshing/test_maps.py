@@ -30,7 +30,7 @@ SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
 
 def cut(vertices: Tensor, topology: Topology, smoothing: float = 0.05) -> tuple[FaceFrames, CutGraph]:
     frames = FaceFrames.of(vertices, topology)
-    directions = directions_of(vertices, topology, frames)
+    directions = directions_of(frames)
     angles = direction_field(frames, directions, smoothing, 4)
     matched = matchings(frames, angles)
     angles, matched = merge_singularities(frames, angles, matched, directions, smoothing, 0.2)
@@ -41,7 +41,7 @@ def problem_of(frames: FaceFrames, graph: CutGraph, spacing: float, align: bool 
     seams = find_seams(frames, graph)
     runs = find_runs(frames, graph, np.radians(12), 1.5 * spacing) if align else []
     count = len(frames.triangles)
-    split = split_integers(frames, graph, seams, runs, 0.5 + 0.5j)
+    split = split_integers(frames, graph, seams, runs)
     density, stiff = np.full((count, 2), 1 / spacing), np.full(count, 30.0)
     return MapProblem(frames, graph, seams, split, np.eye(2), density, stiff), runs
 

@@ -39,9 +39,10 @@ def test_numbers_of_a_preset_go_by_the_papers_names(kind: type) -> None:
         ("", "presets are paper, got ''"),
         ("paper,w_far=1", "numbers of the preset 'paper' are w_reg, w_fair, .* as NAME=X, got 'w_far=1'"),
         ("paper,w_fair", "as NAME=X, got 'w_fair'"),
-        ("paper,w_fair=much", "preset 'paper': w_fair must be a number, got 'much'"),
-        ("paper,steps=1.5", "steps must be a whole number, got '1.5'"),
-        ("paper,w_fair=-1", "fairness_weight=-4.0"),
+        ("paper,w_fair=much", "preset 'paper': w_fair must be a number of at least 0, got 'much'"),
+        ("paper,w_fair=-1", "w_fair must be a number of at least 0, got '-1'"),
+        ("paper,w_reg=inf", "w_reg must be a number of at least 0, got 'inf'"),
+        ("paper,steps=1.5", "steps must be a whole number of at least 0, got '1.5'"),
         ("paper,w_reg=0", "initial_damping"),
     ],
 )

@@ -20,16 +20,27 @@ if TYPE_CHECKING:
     from .outputs import Writer
 
 
-def labels_beside(name: str) -> Path | None:
-    """The file that marks edges of INPUT, if there is one."""
+def marks_file(arguments: argparse.Namespace) -> Path | None:
+    """The file that marks edges of INPUT: that of ``--labels``, else INPUT or the one beside it if there are marks."""
     from ..io import edge_labels_path
 
+    name, given = arguments.input, getattr(arguments, "labels", None)
+    if given is not None:
+        return Path(given)
     if name.startswith("example:"):
         return None
     path = edge_labels_path(name)
     if path.suffix.lower() == ".obj":
         return path if _has_lines(path) else None
     return path if path.exists() else None
+
+
+def file_of_marks(output: Path) -> Path | None:
+    """The file that is to hold marks of edges beside the mesh ``output``; None where the mesh itself holds them."""
+    from ..io import edge_labels_path
+
+    path = edge_labels_path(output)
+    return None if path == output else path
 
 
 def _has_lines(path: Path) -> bool:
@@ -64,11 +75,11 @@ def carried(lines: str, marks: Tensor, step: Refinement) -> tuple[Tensor, str]:
     return fine, f"{int(marks.sum())} marked edges to {int(fine.sum())}: {words}"
 
 
-def read_marks(mesh: PolygonMesh, name: str) -> tuple[Tensor | None, list[str]]:
+def read_marks(mesh: PolygonMesh, arguments: argparse.Namespace) -> tuple[Tensor | None, list[str]]:
     """Marked edges (E,) of INPUT, None without; and what became of them, in words."""
     from ..io import load_edge_labels
 
-    file = labels_beside(name)
+    file = marks_file(arguments)
     if file is None:
         return None, []
     if mesh.repairs:
@@ -86,10 +97,10 @@ class MarkedOutputs(Outputs):
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
         super().__init__(arguments, pictures)
         self._marks: Tensor | None = None
-        self._in_mesh = self.mesh.suffix.lower() == ".obj"
-        has_marks = Path(arguments.input).is_file() and labels_beside(arguments.input) is not None
-        if has_marks and not self._in_mesh:
-            self.beside = {self.mesh.with_suffix(".edges.json"): self._save}
+        beside = file_of_marks(self.mesh)
+        self._in_mesh = beside is None
+        if beside is not None and Path(arguments.input).is_file() and marks_file(arguments) is not None:
+            self.beside = {beside: self._save}
 
     def write_mesh(self, request: Request, result: Any) -> None:
         """See the base class."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from .arguments import positive_count
 from .form_inputs import read_form_input
+from .form_mesh import FormOutputs, add_mesh
 from .inputs import add_handles, add_levels, add_repair, read_handles
 from .job_command import JobCommand
 from .outputs import Request, Writer
@@ -70,8 +71,13 @@ class FormCommand(JobCommand):
         add("--through", nargs=3, action="append", default=[], type=float, metavar=("X", "Y", "Z"),
             help="a point to pass through: pulls the nearest inner vertex of the start; repeatable")  # fmt: skip
         add_levels(parser)
+        add_mesh(parser)
         add_handles(parser)
         add_repair(parser)
+
+    def outputs(self, arguments: argparse.Namespace) -> FormOutputs:
+        """See the base class."""
+        return FormOutputs(arguments, self.pictures)
 
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""

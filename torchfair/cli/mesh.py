@@ -9,15 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .arguments import positive_count
+from .edge_marks import file_of_marks
 from .errors import CommandError
-from .exit_codes import EXIT_NOT_REACHED, EXIT_OK, IN_WORDS
+from .exit_codes import IN_WORDS, exit_code
 from .inputs import add_repair, read_input
 from .mesh_planar import made_planar
 from .options import SettingOptions
-from .outputs import Outputs, Request, Writer
+from .outputs import Outputs, Request, Writer, add_outputs, asked_for
 from .parser import CommandParser
+from .summary import note_lines
 
 if TYPE_CHECKING:
+    from ..io import PolygonMesh
     from ..meshing import MeshingSettings, QuadMesh, TriangleMesh
 
     Made = QuadMesh | TriangleMesh
@@ -65,10 +68,7 @@ def fill(parser: CommandParser) -> None:
     add("--triangles", type=positive_count, metavar="N", help="about so many triangles, with principal edges")
     add("--planar", action="store_true", help="move vertices near the surface until all polygons are planar, as "
         "'torchfair fair --planar quads' does")  # fmt: skip
-    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
-    add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
-    add("--no-pictures", action="store_true", help="write no pictures")
-    add("--force", action="store_true", help="replace files that exist")
+    add_outputs(parser)
     options().add_to(parser)
 
 
@@ -86,28 +86,30 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.planar and arguments.triangles:
         raise CommandError("--planar is for --quads: triangles are planar")
     settings = options().settings(arguments)
-    outputs = MeshOutputs(arguments, {"mesh.png": _singular, "edges.png": _edges})
+    outputs = MeshOutputs(arguments, {"mesh.png": draw_singular, "edges.png": _edges})
     outputs.prepare()
     surface = read_input(arguments.input, arguments.repair)
     outputs.make_folders()
     began = time.perf_counter()
-    made, missed = _made(surface.vertices, surface.topology, arguments, settings)
+    made = _made(surface, arguments, settings)
+    missed: list[str] = []
+    status = None
+    if arguments.planar:
+        made, missed, status = made_planar(made, surface)
     request = Request(surface, {})
     outputs.write_mesh(request, made)
-    lines = [*(f"repaired: {sentence}" for sentence in surface.repairs), *(f"note: {note}" for note in made.notes)]
-    print("\n".join([*lines, *_table(made.report)]), flush=True)
-    outputs.write_others(_report(arguments, made, settings, missed, time.perf_counter() - began), request, made)
-    print("\n".join([*(f"wrote {path}" for path in outputs.paths()), *missed]))
-    return EXIT_NOT_REACHED if missed else EXIT_OK
+    lines = [*note_lines(surface.repairs, made.notes, missed), *table(made.report)]
+    report = _report(arguments, made, settings, missed, time.perf_counter() - began)
+    outputs.finish(request, made, lines, report, missed)
+    return exit_code(status, missed)
 
 
-def _made(vertices: Any, topology: Any, arguments: argparse.Namespace, settings: Any) -> tuple[Made, list[str]]:
+def _made(surface: PolygonMesh, arguments: argparse.Namespace, settings: MeshingSettings) -> Any:
     from ..meshing import principal_quads, principal_triangles
 
     if arguments.triangles:
-        return principal_triangles(vertices, topology, count=arguments.triangles, settings=settings), []
-    quads = principal_quads(vertices, topology, count=arguments.quads, settings=settings)
-    return made_planar(quads, (vertices, topology)) if arguments.planar else (quads, [])
+        return principal_triangles(surface.vertices, surface.topology, count=arguments.triangles, settings=settings)
+    return principal_quads(surface.vertices, surface.topology, count=arguments.quads, settings=settings)
 
 
 class MeshOutputs(Outputs):
@@ -115,8 +117,9 @@ class MeshOutputs(Outputs):
 
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
         super().__init__(arguments, pictures)
-        if arguments.triangles and self.mesh.suffix.lower() != ".obj":
-            self.beside = {self.mesh.with_suffix(".edges.json"): _labels}
+        beside = file_of_marks(self.mesh)
+        if arguments.triangles and beside is not None:
+            self.beside = {beside: _labels}
 
     def polylines(self, result: Any) -> Any:
         """Principal edges, unless they stand in a file beside."""
@@ -129,7 +132,8 @@ def _labels(path: Path, request: Request, result: Any, overwrite: bool) -> None:
     save_edge_labels(path, result.topology, result.principal.mask, overwrite=overwrite)
 
 
-def _singular(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+def draw_singular(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+    """Writes the picture of a principal mesh."""
     from ..viewing import picture_principal_edges, picture_principal_mesh
 
     if hasattr(result, "principal"):
@@ -146,7 +150,8 @@ def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
     picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
 
 
-def _table(report: Mapping[str, Any]) -> list[str]:
+def table(report: Mapping[str, Any]) -> list[str]:
+    """What was measured on a principal mesh, one line for each."""
     width = max(map(len, _ROWS.values()))
     lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items()]
     found = ", ".join(f"{count} of index {index}" for index, count in report["singular"].items())
@@ -162,10 +167,9 @@ def _report(
 ) -> dict[str, Any]:
     from ..settings import plain_settings
 
-    names = ("input", "quads", "triangles", "planar", "output")
     return {
         "job": "mesh",
-        "request": {name: getattr(arguments, name) for name in names},
+        "request": asked_for(arguments),
         "settings": plain_settings(settings),
         "measures": made.report,
         "singular_points": made.singular_points,

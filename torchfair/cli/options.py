@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..errors import SettingsError
@@ -107,11 +108,31 @@ class SettingOptions(Generic[S]):
         """
         from ..settings.files import with_fields
 
-        given = {name.removeprefix(_DEST): value for name, value in vars(arguments).items() if name.startswith(_DEST)}
         try:
-            return with_fields(self._basis(arguments.settings, getattr(arguments, "preset", None)), given)
+            basis = self._basis(arguments.settings, getattr(arguments, "preset", None))
         except SettingsError as error:
             raise CommandError(str(error)) from None
+        try:
+            return with_fields(basis, _given(arguments))
+        except SettingsError as error:
+            raise CommandError(self._in_options(str(error))) from None
+
+    def asked(self, arguments: argparse.Namespace) -> Collection[str]:
+        """Fields that options, the file or the preset name; a preset names all of them."""
+        from ..settings.files import read_fields
+
+        if getattr(arguments, "preset", None) is not None:
+            return self._fields
+        file = arguments.settings
+        return {*_given(arguments), *(() if file is None else read_fields(file, self._kind, job=self._job))}
+
+    def _in_options(self, words: str) -> str:
+        """What the library says of fields, with the options that give them in their place."""
+        for name, option in self.names.items():
+            field = name.rpartition(".")[2]
+            ahead = r"\b" if "_" in field else "(?==| must)"  # others are words of the language, too
+            words = re.sub(rf"(?<![\w-]){field}{ahead}", f"--{option}", words)
+        return words
 
     def _basis(self, file: str | None, preset: str | None) -> S:
         """What options change."""
@@ -122,6 +143,11 @@ class SettingOptions(Generic[S]):
         if preset is not None:
             return preset_settings(preset, self._kind)
         return self._kind() if file is None else read_settings(file, self._kind, job=self._job)
+
+
+def _given(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Values of the options that stand on the command line, by field."""
+    return {name.removeprefix(_DEST): value for name, value in vars(arguments).items() if name.startswith(_DEST)}
 
 
 def option_help(field: SettingField) -> str:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from ..io import PolygonMesh
 
+_NOT_ASKED = ("run", "name", "version")
 _MESH_FORMATS = (".obj", ".off", ".ply")
 
 
@@ -30,6 +31,8 @@ class Request:
         marks: Marked edges (E,) of the mesh, which go with it; None for none.
         settings: To solve with; by default those that options ask for.
         report: Entries of ``report.json`` beside those that all jobs have.
+        missed: What was asked for beside the job and is not there, in words.
+        interrupted: Whether what comes after the job was interrupted.
     """
 
     mesh: PolygonMesh
@@ -39,6 +42,8 @@ class Request:
     settings: Any = None
     marks: Tensor | None = None
     report: dict[str, Any] = field(default_factory=dict)
+    missed: list[str] = field(default_factory=list)
+    interrupted: bool = False
 
 
 Writer = Callable[[Path, Any, Any, bool], object]
@@ -94,6 +99,10 @@ class Outputs:
         """Vertices of line elements of an OBJ file."""
         return ()
 
+    def lines(self) -> list[str]:
+        """What is said of what was written beside the mesh."""
+        return []
+
     def write_others(self, report: Mapping[str, Any], request: Request, result: Any) -> None:
         """Writes the rest."""
         from ..io import write_report
@@ -101,9 +110,31 @@ class Outputs:
         write_report(self.report, report, overwrite=self.force)
         self._write(self.pictures | self.others, request, result)
 
+    def finish(
+        self, request: Request, result: Any, lines: Sequence[str], report: Mapping[str, Any], missed: Sequence[str]
+    ) -> None:
+        """Says what came out, writes the rest, and says where it is and what was missed."""
+        print("\n".join(lines), flush=True)
+        self.write_others(report, request, result)
+        print("\n".join([*(f"wrote {path}" for path in self.paths()), *missed]))
+
     def _write(self, files: Mapping[Path, Writer], request: Request, result: Any) -> None:
         for path, writer in files.items():
             writer(path, request, result, self.force)
+
+
+def add_outputs(parser: argparse.ArgumentParser) -> None:
+    """Adds the options that say where they go."""
+    add = parser.add_argument
+    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
+    add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
+    add("--no-pictures", action="store_true", help="write no pictures")
+    add("--force", action="store_true", help="replace files that exist")
+
+
+def asked_for(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Arguments by name for a report, without settings."""
+    return {name: value for name, value in vars(arguments).items() if name not in _NOT_ASKED and "." not in name}
 
 
 def refuse_unknown_format(path: Path) -> None:

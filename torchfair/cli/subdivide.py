@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .arguments import non_negative, positive_count
-from .edge_marks import carried, labels_beside
+from .edge_marks import carried, file_of_marks, marks_file
 from .errors import CommandError
 from .inputs import add_repair, read_input
 from .outputs import refuse_existing, refuse_unknown_format
@@ -60,12 +60,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     output = Path(arguments.output)
     refuse_unknown_format(output)
-    in_mesh = output.suffix.lower() == ".obj"
-    beside = output.with_suffix(".edges.json")
+    beside = file_of_marks(output)
     refuse_existing([output], force=arguments.force)
     mesh = read_input(arguments.input, arguments.repair)
     marks = _marks(arguments, mesh)
-    if marks is not None and not in_mesh:
+    if marks is not None and beside is not None:
         refuse_existing([beside], force=arguments.force)
     scheme: Any = arguments.scheme.replace("-", "_")
     corners = boundary_corners(mesh.vertices, mesh.topology, math.radians(arguments.corner_angle))
@@ -77,10 +76,10 @@ def run(arguments: argparse.Namespace) -> int:
     if marks is not None:
         fine, note = carried(arguments.lines, marks, step)
         notes.append(note)
-        lines = polylines_along(step.topology, fine) if in_mesh else []
+        lines = polylines_along(step.topology, fine) if beside is None else []
     vertices = step.apply(mesh.vertices)
     save_mesh(output, vertices, step.topology, overwrite=arguments.force, polylines=lines)
-    if fine is not None and not in_mesh:
+    if fine is not None and beside is not None:
         from ..io import save_edge_labels
 
         save_edge_labels(beside, step.topology, fine, overwrite=arguments.force)
@@ -94,7 +93,7 @@ def _marks(arguments: argparse.Namespace, mesh: PolygonMesh) -> Tensor | None:
     """(E,) bool: marked edges; None if there are none."""
     from ..io import load_edge_labels
 
-    file = arguments.labels or labels_beside(arguments.input)
+    file = marks_file(arguments)
     if file is None:
         return None
     if mesh.repairs:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .arguments import count
+from .edge_marks import file_of_marks
 from .inputs import add_handles, add_levels, add_reference, read_handles, read_input, read_reference
 from .job_command import JobCommand
 from .outputs import Outputs, Request, Writer
@@ -90,7 +91,7 @@ class SymmetricCommand(JobCommand):
         handles, mesh = read_handles(arguments), read_input(arguments.input)
         if mesh.topology.is_quadrangular:
             edges, vertices, notes = read_quads(arguments, mesh)
-            settings = even_settings(arguments, settings)
+            settings = even_settings(self.options().asked(arguments), settings)
             mesh = PolygonMesh(vertices, edges.topology)
         else:
             edges, notes = read_principal_edges(arguments, mesh)
@@ -119,8 +120,8 @@ class SymmetricOutputs(Outputs):
         super().__init__(arguments, pictures)
         self._strips = StripFiles(arguments)
         self.others = self._strips.files(self.folder)
-        if self.mesh.suffix.lower() != ".obj":
-            self.beside = {self.mesh.with_suffix(".edges.json"): _labels}
+        beside = file_of_marks(self.mesh)
+        self.beside = {} if beside is None else {beside: _labels}
 
     def write_mesh(self, request: Request, result: Any) -> None:
         """Makes the strips too, so that the report can say how true they are."""

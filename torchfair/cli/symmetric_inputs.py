@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import MeshError
 from .arguments import count
-from .edge_marks import labels_beside
+from .edge_marks import marks_file
 from .errors import CommandError
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def _chosen_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[Pri
         v, w = arguments.seed
         edges = principal_edges_from_seed(topology, joined_edge(arguments.seed, mesh), allow_exceptions=allow)
         return edges, f"principal edges are parallel to ({v}, {w})"
-    file = arguments.labels or labels_beside(arguments.input)
+    file = marks_file(arguments)
     if file is not None:
         edges = PrincipalEdges(topology, load_edge_labels(file, topology))
         return (edges if allow else edges.check()), f"principal edges are those of {file}"

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Collection
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from .edge_marks import labels_beside
+from .edge_marks import marks_file
 from .errors import CommandError
 from .symmetric_inputs import joined_edge
 
@@ -29,11 +30,9 @@ def read_quads(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[Princi
     return edges, half_shifted(mesh.vertices, mesh.topology, edges), [cut, note]
 
 
-def even_settings(arguments: argparse.Namespace, settings: Any) -> Any:
-    """Settings that keep stars of cut quads even, unless something else was asked for."""
-    if settings.evenness_weight or hasattr(arguments, "settings.evenness_weight"):
-        return settings
-    return replace(settings, evenness_weight=_EVENNESS)
+def even_settings(asked: Collection[str], settings: Any) -> Any:
+    """Settings that keep stars of cut quads even, unless evenness is among the fields that were ``asked`` for."""
+    return settings if "evenness_weight" in asked else replace(settings, evenness_weight=_EVENNESS)
 
 
 def _seed(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[int | None, str]:
@@ -43,7 +42,7 @@ def _seed(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[int | None,
 
     if arguments.seed is not None:
         return joined_edge(arguments.seed, mesh), "principal edges are those in line with the seed"
-    file = arguments.labels or labels_beside(arguments.input)
+    file = marks_file(arguments)
     if file is None:
         return None, "principal edges are the family of edges that bends less out of the surface"
     marked = load_edge_labels(file, mesh.topology)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -41,7 +42,7 @@ def direction_field(frames: FaceFrames, directions: Directions, smoothing: float
     total = pull * wanted + _BOUNDARY * at_edge * edge + _WEAKEST * frames.areas / frames.areas.mean()
     weights = pull + _BOUNDARY * at_edge + _WEAKEST * frames.areas / frames.areas.mean()
     stiffness = connection_laplacian(frames, np.exp(1j * symmetry * frames.turns)) + sp.diags(weights)
-    field = hermitian_solve(stiffness, total)
+    field = hermitian_solver(stiffness)(total)
     return np.asarray(np.angle(field) / symmetry)
 
 
@@ -54,17 +55,15 @@ def connection_laplacian(frames: FaceFrames, turns: Complexes) -> sp.csr_matrix:
     return sp.csr_matrix((values, places), shape=(len(frames.triangles),) * 2)
 
 
-def hermitian_solve(matrix: sp.csr_matrix, right: Complexes) -> Complexes:
-    """Solution of a positive definite system."""
+def hermitian_solver(matrix: sp.csr_matrix) -> Callable[[Complexes], Complexes]:
+    """Solves a positive definite system for right sides, factorised once."""
     factor = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return np.asarray(factor.solve(right))
+    return lambda right: np.asarray(factor.solve(right))
 
 
 def _along_boundary(frames: FaceFrames, symmetry: int) -> tuple[Complexes, Floats]:
     """Of every face the power of the direction of its boundary edge, and 1 where it has one, else 0."""
-    topology = frames.topology
-    corners = np.flatnonzero(topology.corner_edges.numpy() >= topology.num_interior_edges)
-    faces, side = corners // 3, corners % 3
+    faces, side = frames.outer_corners // 3, frames.outer_corners % 3
     triangles = frames.triangles[faces]
     every = np.arange(len(faces))
     along = frames.points[triangles[every, (side + 1) % 3]] - frames.points[triangles[every, side]]

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from torch import Tensor
+import torch
 
 from ..geometry import fitted_curvature
-from ..topology import Topology
 from .frames import Complexes, FaceFrames, Floats, Ints
 
 _FLOOR = 0.1  # of the mean curvature: a difference of curvatures below that is nothing to go by
@@ -33,16 +32,14 @@ class Directions:
     confidence: Floats
 
 
-def directions_of(vertices: Tensor, topology: Topology, frames: FaceFrames, rings: int = 2) -> Directions:
+def directions_of(frames: FaceFrames, rings: int = 2) -> Directions:
     """Directions by polynomials fitted over rings of vertices, averaged over the corners of triangles.
 
     Args:
-        vertices: (V, 3) positions.
-        topology: a triangle mesh.
-        frames: its frames.
+        frames: of the triangles.
         rings: 2 for smooth surfaces, more where there is noise; see :func:`torchfair.geometry.fitted_curvature`.
     """
-    fitted = fitted_curvature(vertices.detach().cpu().double(), frames.topology, rings=rings)
+    fitted = fitted_curvature(torch.from_numpy(frames.points), frames.topology, rings=rings)
     whole = fitted.traceless.numpy()[frames.triangles].mean(1)
     axes = np.stack([frames.first, frames.second], axis=1)
     plane = axes @ whole @ axes.transpose(0, 2, 1)

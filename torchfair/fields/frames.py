@@ -92,12 +92,19 @@ class FaceFrames:
         return np.asarray(x + 1j * y)
 
     @cached_property
-    def corner_angles(self) -> Floats:
-        """(F, 3) angles at the corners."""
-        to_next = np.roll(self.points[self.triangles], -1, axis=1) - self.points[self.triangles]
-        to_last = -np.roll(to_next, 1, axis=1)
-        sine = np.linalg.norm(np.cross(to_next, to_last), axis=-1)
-        return np.asarray(np.arctan2(sine, (to_next * to_last).sum(-1)))
+    def outer_corners(self) -> Ints:
+        """(B,) ``3 f + k`` where boundary edges start at corner k of face f."""
+        return np.flatnonzero(self.topology.corner_edges.numpy() >= self.topology.num_interior_edges)
+
+    @cached_property
+    def left_corners(self) -> tuple[Ints, Ints]:
+        """(E,) left face of every edge, boundary edges included, and its corner where the edge starts."""
+        inner = self.topology.num_interior_edges
+        face, corner = np.zeros((2, self.topology.num_edges), np.int64)
+        face[:inner], corner[:inner] = self.faces[:, 0], self.corners[:, 0]
+        edge = self.topology.corner_edges.numpy()[self.outer_corners]
+        face[edge], corner[edge] = self.outer_corners // 3, self.outer_corners % 3
+        return face, corner
 
     @cached_property
     def dual_weights(self) -> Floats:

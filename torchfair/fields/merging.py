@@ -6,9 +6,11 @@ import itertools
 
 import numpy as np
 import scipy.sparse as sp
+import torch
 from scipy.sparse.csgraph import dijkstra
 
-from .direction_field import Symmetry, connection_laplacian, hermitian_solve
+from .._graph import edge_numbers
+from .direction_field import Symmetry, connection_laplacian, hermitian_solver
 from .directions import Directions
 from .frames import Bools, FaceFrames, Floats, Ints
 from .matchings import QUARTER, vertex_charges
@@ -71,10 +73,10 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
     (v, w), lengths = frames.edges[inner].T, frames.lengths[inner]
     graph = sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(size, size))
     distance, before = dijkstra(graph, indices=singular, limit=radius, return_predecessors=True)
-    number = {(int(a), int(b)): e for e, (a, b) in enumerate(frames.edges)}
     near = distance[:, singular]
     rows, columns = np.nonzero(np.triu(np.isfinite(near), 1))
-    moved, free = matched.copy(), set(singular.tolist())
+    free = set(singular.tolist())
+    steps: list[tuple[int, int, int]] = []
     for place in np.argsort(near[rows, columns], kind="stable"):
         row, goal = rows[place], int(singular[columns[place]])
         start = int(singular[row])
@@ -86,16 +88,19 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
         while path[-1] != start:
             path.append(int(before[row, path[-1]]))
         middle = int(np.argmin(trust[path]))
-        # The charge of a vertex goes from one end of an edge to the other: a step more or less over the edge.
-        steps = [(a, b, int(charges[goal])) for a, b in itertools.pairwise(path[: middle + 1])]
+        steps += [(a, b, int(charges[goal])) for a, b in itertools.pairwise(path[: middle + 1])]
         steps += [(b, a, int(charges[start])) for a, b in itertools.pairwise(path[middle:])]
-        for a, b, charge in steps:
-            if (a, b) in number:
-                moved[number[a, b]] -= charge
-            else:
-                moved[number[b, a]] += charge
         touched[path] = True
-    return moved, touched
+    return _carried(frames, matched, steps), touched
+
+
+def _carried(frames: FaceFrames, matched: Ints, steps: list[tuple[int, int, int]]) -> Ints:
+    """Matchings after charges went along edges, from one vertex to another: a step more or less over each edge."""
+    a, b, charges = np.array(steps, np.int64).reshape(-1, 3).T
+    edges = edge_numbers(frames.topology, torch.from_numpy(np.stack([a, b], 1))).numpy()
+    moved = matched.copy()
+    np.subtract.at(moved, edges, np.where(frames.edges[edges, 0] == a, charges, -charges))
+    return moved
 
 
 def _refit(
@@ -121,7 +126,8 @@ def _refit(
     count = len(frames.triangles)
     jumps = np.bincount(g, turning, count) - np.bincount(f, turning, count)
     principal, step = np.angle(directions.values) / 2, 2 * np.pi / symmetry
+    solve = hermitian_solver(stiffness)
     for _ in range(2):
         nearest = principal + step * np.rint((angles - principal) / step)
-        angles = hermitian_solve(stiffness, pull * nearest + jumps + 0j).real
+        angles = solve(pull * nearest + jumps + 0j).real
     return angles

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import torch
@@ -64,6 +65,10 @@ class Diagnosis:
 
         Keys are those of ``torchfair diagnose --json``; a value is None where there is nothing to measure.
         """
+        return dict(self._counts)
+
+    @cached_property
+    def _counts(self) -> dict[str, Any]:
         classes, topology, inner = self.classes, self.topology, self.inner
         convex, saddle, neither = map(classes.is_kind, (StarKind.CONVEX, StarKind.SADDLE, StarKind.NEITHER))
         folded = self.crossings > 0

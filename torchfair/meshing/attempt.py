@@ -1,20 +1,18 @@
-"""One attempt at a mesh: field, cut, map, cells, and their verification."""
+"""One attempt at a mesh of a surface that is cut open: map, cells, and their verification."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..boundary import boundary_corners
 from ..errors import MeshError
-from ..fields import Directions, FaceFrames, Symmetry, direction_field, matchings, merge_singularities, vertex_charges
 from ..fields.frames import Floats, Ints
-from ..fields.matchings import QUARTER
 from .boundary_cells import Compact, compact, tidy_boundary
 from .boundary_runs import BoundaryRun, find_runs, inward_moves
 from .crossings import off_the_lines
-from .cut_graph import CutGraph, cut_open
+from .cut_graph import CutGraph
 from .integers import split_integers
 from .lattice import Lattice
 from .seamless_map import MapProblem, SeamlessMap
@@ -77,15 +75,14 @@ class PieceMesh:
 
 
 def attempt(
-    surface: DesignSurface, directions: Directions, lattice: Lattice, plan: Plan, settings: MeshingSettings
+    surface: DesignSurface, graph: CutGraph, lattice: Lattice, plan: Plan, settings: MeshingSettings
 ) -> PieceMesh:
-    """Meshes a component as planned.
+    """Meshes a component as planned, cut open with the field of the plan.
 
     Raises:
         FailedAttemptError: if that gives no valid mesh.
     """
     frames = surface.frames
-    graph = _combed(frames, directions, lattice.symmetry, plan, settings)
     runs: list[BoundaryRun] = []
     if plan.align:
         shortest = _SHORTEST_RUN * plan.spacing
@@ -98,37 +95,11 @@ def attempt(
         area = lattice.cell * plan.spacing**2
         whole = compact(tidy_boundary(cells, plan.spacing, area))
         verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
-    except FailedAttemptError:
-        raise
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None
     singular = np.flatnonzero(graph.charges)
     places, charges = frames.points[singular], graph.charges[singular]
     return PieceMesh(whole.positions, whole.faces, _rows(cells, whole), places, charges)
-
-
-def _combed(
-    frames: FaceFrames, directions: Directions, symmetry: Symmetry, plan: Plan, settings: MeshingSettings
-) -> CutGraph:
-    """The mesh cut open, with a field of directions.
-
-    Crosses are tried for directions, too: the larger and the smaller curvature change places where the surface has an
-    umbilic line, crosses go on. They will do if one of their two directions never comes back as the other.
-    """
-    radius = settings.merging * plan.spacing
-    tried: tuple[Symmetry, ...] = (4, 2) if symmetry == 2 else (4,)
-    for of in tried:
-        angles = direction_field(frames, directions, plan.smoothing, of)
-        matched = matchings(frames, angles, of)
-        angles, matched = merge_singularities(frames, angles, matched, directions, plan.smoothing, radius, of)
-        graph = cut_open(frames, angles, matched, vertex_charges(frames, angles, matched))
-        if symmetry == 4 or not (graph.quarters % 2).any():
-            break
-    if symmetry == 4:
-        return graph
-    along = directions.values * np.exp(-2j * graph.angles)
-    across = float(frames.areas @ along.real) < 0
-    return replace(graph, angles=graph.angles + QUARTER) if across else graph
 
 
 def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
@@ -152,7 +123,7 @@ def _map(surface: DesignSurface, graph: CutGraph, lattice: Lattice, plan: Plan, 
         frames=frames,
         graph=graph,
         seams=seams,
-        split=split_integers(frames, graph, seams, runs, 0.5 + 0.5j),
+        split=split_integers(frames, graph, seams, runs),
         shear=lattice.matrix,
         density=np.tile(1 / (plan.spacing * np.array(lattice.spacings)), (count, 1)),
         anisotropy=np.full(count, _ANISOTROPY),

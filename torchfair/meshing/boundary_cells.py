@@ -38,21 +38,15 @@ def tidy_boundary(cells: Cells, spacing: float, area: float) -> PolygonEdits:
 
 def _collapse_short(edits: PolygonEdits, limit: float) -> int:
     """Collapses edges at the boundary below a length, the shortest first."""
-    sides = {tuple(sorted(edge)): number for number in edits.boundary_faces() for edge in edits.sides(number)}
+    sides = {(min(edge), max(edge)) for number in edits.boundary_faces() for edge in edits.sides(number)}
     lengths = sorted((edits.length((a, b)), (a, b)) for a, b in sides if edits.on_boundary[a] or edits.on_boundary[b])
     done = 0
     for length, (a, b) in lengths:
         if length >= limit:
             break
         if edits.around.get(a) and edits.around.get(b) and edits.length((a, b)) < limit:
-            shared = edits.around[a] & edits.around[b]
-            inner = sum(_is_side(edits, number, a, b) for number in shared) == 2
-            done += bool(shared) and edits.collapse((a, b), inner)
+            done += edits.collapse((a, b))
     return done
-
-
-def _is_side(edits: PolygonEdits, number: int, a: int, b: int) -> bool:
-    return any({x, y} == {a, b} for x, y in edits.sides(number))
 
 
 def _join_small(edits: PolygonEdits, limit: float) -> int:
@@ -63,7 +57,7 @@ def _join_small(edits: PolygonEdits, limit: float) -> int:
             continue
         sides = sorted(edits.sides(number), key=edits.length)
         inner = [edge for edge in sides if edits.across(edge, number) is not None]
-        done += any(edits.collapse(edge, edge in inner) for edge in sides[:2]) or any(
+        done += any(edits.collapse(edge) for edge in sides[:2]) or any(
             edits.merge(number, edge) for edge in reversed(inner)
         )
     return done

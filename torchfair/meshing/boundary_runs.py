@@ -39,8 +39,7 @@ def find_runs(
         components: coordinates whose lines run along or across the field.
     """
     topology = frames.topology
-    edge_of = topology.corner_edges.numpy()
-    outer = np.flatnonzero(edge_of >= topology.num_interior_edges)
+    outer = frames.outer_corners
     corner_from = np.full(topology.num_vertices, -1)
     corner_from[topology.corners.numpy()[outer]] = outer
     turned = _turned_around(frames, graph)

@@ -9,7 +9,7 @@ import numpy as np
 from .._ranges import ranges
 from ..errors import MeshError
 from ..fields.frames import Bools, Ints
-from .crossings import Crossings, left_corners, sorted_groups
+from .crossings import Crossings, sorted_groups
 from .seamless_map import SeamlessMap
 
 
@@ -96,7 +96,7 @@ def _changes(face: Ints, coordinate: Ints, level: Ints, order: Ints) -> np.ndarr
 def _border(found: SeamlessMap, crossings: Crossings) -> tuple[Ints, ...]:
     """Everything on the borders of triangles: face, side, rank along the side, node, and the line."""
     frames = found.frames
-    face, corner = left_corners(frames)
+    face, corner = frames.left_corners
     edge, count = crossings.edge, len(crossings.edge)
     number = np.arange(count)
     rank = number - crossings.offsets[edge] + 1

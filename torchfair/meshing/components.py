@@ -170,9 +170,10 @@ def mesh_to_count(
         NoMeshError: if the first spacing gives no valid mesh.
     """
     best = mesh_components(surface, lattices, spacing, settings)
+    if count is None:
+        return best, spacing
     short = replace(settings, time_limit=settings.time_limit * _SHARE)
-    for _ in range(_CORRECTIONS if count is not None else 0):
-        assert count is not None
+    for _ in range(_CORRECTIONS):
         ratio = faces_of(best) / count
         if abs(ratio - 1) <= _COUNT_TOLERANCE:
             break

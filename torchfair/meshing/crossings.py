@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._ranges import ranges
-from ..fields.frames import Bools, FaceFrames, Floats, Ints
+from ..fields.frames import Bools, Floats, Ints
 from .seamless_map import SeamlessMap
 from .seams import ROTATIONS
 
@@ -39,7 +39,7 @@ class Crossings:
 def find_crossings(found: SeamlessMap, values: np.ndarray) -> Crossings:
     """The crossings of a seamless map, for values of copies off the lines."""
     frames, at_corners = found.frames, values[found.seams.copies]
-    face, corner = left_corners(frames)
+    face, corner = frames.left_corners
     start, end = at_corners[face, corner], at_corners[face, (corner + 1) % 3]
     parts = [_levels(getattr(start, part), getattr(end, part)) for part in ("real", "imag")]
     edge, level, along = (np.concatenate([part[k] for part in parts]) for k in range(3))
@@ -73,18 +73,6 @@ def off_the_lines(found: SeamlessMap, inward: np.ndarray | None = None) -> np.nd
         move[close] += factor * (np.where(to_line[close] < 0, -_MARGIN, _MARGIN) - to_line[close])
     move[graph.singular] = 0
     return np.asarray(found.values + seams.unit * move[seams.vertex])
-
-
-def left_corners(frames: FaceFrames) -> tuple[Ints, Ints]:
-    """(E,) left face of every edge, boundary edges included, and its corner where the edge starts."""
-    topology = frames.topology
-    edge_of = topology.corner_edges.numpy()
-    outer = np.flatnonzero(edge_of >= topology.num_interior_edges)
-    face, corner = np.zeros((2, topology.num_edges), np.int64)
-    inner = topology.num_interior_edges
-    face[:inner], corner[:inner] = frames.faces[:, 0], frames.corners[:, 0]
-    face[edge_of[outer]], corner[edge_of[outer]] = outer // 3, outer % 3
-    return face, corner
 
 
 def _levels(start: Floats, end: Floats) -> tuple[Ints, Ints, Floats]:

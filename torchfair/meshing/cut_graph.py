@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,6 @@ class CutGraph:
         quarters: (I,) quarter turns over edges, 0 to 3, 0 where there is no cut.
         cut: (I,) bool.
         charges: (V,) four times the index.
-        singular: (V,) bool: where it is not 0.
         paths: place of every cut edge; all edges of a path turn alike.
         num_paths: their number.
     """
@@ -39,9 +39,13 @@ class CutGraph:
     quarters: Ints
     cut: Bools
     charges: Ints
-    singular: Bools
     paths: dict[int, PathEdge]
     num_paths: int
+
+    @cached_property
+    def singular(self) -> Bools:
+        """(V,) where the index is not 0."""
+        return np.asarray(self.charges != 0)
 
 
 def cut_open(frames: FaceFrames, angles: Floats, matched: Ints, charges: Ints) -> CutGraph:
@@ -67,7 +71,7 @@ def cut_open(frames: FaceFrames, angles: Floats, matched: Ints, charges: Ints) -
     cut = ~tree
     _prune(frames, cut, singular)
     paths, count = _paths(frames, cut, singular)
-    return CutGraph(angles + QUARTER * turned, quarters % 4, cut, charges, singular, paths, count)
+    return CutGraph(angles + QUARTER * turned, quarters % 4, cut, charges, paths, count)
 
 
 def _dual_tree(frames: FaceFrames) -> tuple[Bools, Ints, Ints]:

@@ -31,9 +31,7 @@ class IntegerSplit:
     fixed: np.ndarray
 
 
-def split_integers(
-    frames: FaceFrames, graph: CutGraph, seams: Seams, runs: list[BoundaryRun], phase: complex
-) -> IntegerSplit:
+def split_integers(frames: FaceFrames, graph: CutGraph, seams: Seams, runs: list[BoundaryRun]) -> IntegerSplit:
     """Separates free values from whole numbers.
 
     Args:
@@ -41,9 +39,8 @@ def split_integers(
         graph: the cut.
         seams: its copies.
         runs: boundary edges on lines of whole numbers.
-        phase: value in the middle of a mesh that may be moved as a whole.
     """
-    return _Splitter(frames, graph, seams, runs).split(phase)
+    return _Splitter(frames, graph, seams, runs).split()
 
 
 class _Splitter:
@@ -55,7 +52,7 @@ class _Splitter:
         self.first_run = self.first_path + 2 * graph.num_paths
         self.count = self.first_run + len(runs)
 
-    def split(self, phase: complex) -> IntegerSplit:
+    def split(self) -> IntegerSplit:
         values, steps = (real_form(m) for m in self.seams.matrices(len(self.frames.points), self.graph.num_paths))
         ties, rows = self._ties(values, steps)
         rows += self._closures()
@@ -72,8 +69,7 @@ class _Splitter:
             (steps.data, steps.indices + self.first_path, steps.indptr), (len(self.seams.vertex) * 2, self.count)
         )
         fixed = np.zeros(unknowns)
-        for unknown in held:
-            fixed[unknown] = phase.imag if unknown % 2 else phase.real
+        fixed[held] = 0.5  # of a mesh that may be moved as a whole
         return IntegerSplit(values[:, np.flatnonzero(free)], (values @ tied + paths).tocsr(), basis, values @ fixed)
 
     def _ties(self, values: sp.csr_matrix, steps: sp.csr_matrix) -> tuple[dict[int, Row], list[Row]]:

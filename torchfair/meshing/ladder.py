@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from functools import cache
 
 from ..errors import MeshError
 from ..fields import Directions
 from .attempt import FailedAttemptError, PieceMesh, Plan, attempt
+from .combing import combed
+from .cut_graph import CutGraph
 from .lattice import Lattice
 from .settings import MeshingSettings
 from .surface import DesignSurface
@@ -44,13 +47,22 @@ def mesh_component(
     began = time.monotonic()
     failure: FailedAttemptError | None = None
     number = 0
+
+    @cache
+    def finer(spacing: float) -> tuple[DesignSurface, Directions]:
+        return surface.cut_finer(directions, spacing)
+
+    @cache
+    def graph(spacing: float, smoothing: float) -> CutGraph:
+        triangles, carried = finer(spacing)
+        return combed(triangles.frames, carried, lattice.symmetry, smoothing, settings.merging * spacing)
+
     for plan, words in plans(spacing, smoothing, settings):
         if number and (not settings.fallback or time.monotonic() - began > settings.time_limit):
             break
         number += 1
-        finer, carried = surface.cut_finer(directions, plan.spacing)
         try:
-            return attempt(finer, carried, lattice, plan, settings), words
+            return attempt(finer(plan.spacing)[0], graph(plan.spacing, plan.smoothing), lattice, plan, settings), words
         except FailedAttemptError as error:
             failure = error if failure is None or failure.vertex < 0 else failure
     assert failure is not None

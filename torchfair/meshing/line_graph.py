@@ -61,7 +61,8 @@ def build_line_graph(
     is_through = np.zeros(int(segments.ends.max(initial=-1)) + 1, bool)
     is_through[: len(crossings.edge)] = crossings.edge < len(frames.faces)
     inner = _join(segments, is_through)
-    ring, first_free = _boundary(found, crossings, points, corners)
+    first_corner = len(crossings.edge) + int(found.graph.singular.sum()) + len(points.chords)
+    ring = _boundary(found, crossings, corners, first_corner)
     outline = _outline(ring)
     darts = [np.concatenate(pair) for pair in zip(inner, outline, strict=True)]
     origin, twin, around, rank, coordinate = darts
@@ -71,12 +72,12 @@ def build_line_graph(
     previous = _cyclic_previous(origin[order], order)
     outer = np.zeros(len(origin), bool)
     outer[len(inner[0]) + 1 :: 2] = True
-    positions = _positions(found, crossings, chords, points, corners, first_free)
+    positions = _positions(found, crossings, chords, points, corners)
     count = len(positions)
     on_boundary, singular, is_corner = np.zeros((3, count), bool)
     on_boundary[np.concatenate([*ring, []]).astype(np.int64)] = True
     singular[len(crossings.edge) : len(crossings.edge) + int(found.graph.singular.sum())] = True
-    is_corner[first_free:] = True
+    is_corner[first_corner:] = True
     return LineGraph(positions, on_boundary, singular, is_corner, origin, twin, previous, coordinate, outer)
 
 
@@ -148,13 +149,10 @@ def _join(segments: _Segments, is_through: Bools) -> Darts:
             segments.coordinate[owner[ends]])  # fmt: skip
 
 
-def _boundary(
-    found: SeamlessMap, crossings: Crossings, points: LatticePoints, corners: Bools
-) -> tuple[list[Ints], int]:
-    """Nodes along every boundary loop, and the number of the first corner."""
+def _boundary(found: SeamlessMap, crossings: Crossings, corners: Bools, first_corner: int) -> list[Ints]:
+    """Nodes along every boundary loop."""
     topology = found.frames.topology
-    first = len(crossings.edge) + int(found.graph.singular.sum()) + len(points.chords)
-    name = np.cumsum(corners) - 1 + first
+    name = np.cumsum(corners) - 1 + first_corner
     starts = topology.boundary_edges.numpy()[:, 0]
     edge_from = np.zeros(topology.num_vertices, np.int64)
     edge_from[starts] = np.arange(topology.num_interior_edges, topology.num_edges)
@@ -167,7 +165,7 @@ def _boundary(
             edge = edge_from[vertex]
             nodes.extend(range(crossings.offsets[edge], crossings.offsets[edge + 1]))
         loops.append(np.array(nodes, np.int64))
-    return loops, first
+    return loops
 
 
 def _outline(loops: list[Ints]) -> Darts:
@@ -227,7 +225,7 @@ def _cyclic_previous(origin: Ints, order: Ints) -> Ints:
 
 
 def _positions(
-    found: SeamlessMap, crossings: Crossings, chords: Chords, points: LatticePoints, corners: Bools, first_free: int
+    found: SeamlessMap, crossings: Crossings, chords: Chords, points: LatticePoints, corners: Bools
 ) -> Floats:
     """Nodes in space, on the triangles."""
     frames = found.frames

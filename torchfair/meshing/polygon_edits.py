@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..fields.frames import Bools, Floats
+from .polygon_area import area_vector
 
 Edge = tuple[int, int]
 
@@ -30,7 +31,7 @@ class PolygonEdits:
         for number, face in self.faces.items():
             for node in face:
                 self.around[node].add(number)
-        self.normals = {number: self.area_vector(face) for number, face in self.faces.items()}
+        self.normals = {number: area_vector(self.positions, face) for number, face in self.faces.items()}
 
     def place_of(self, node: int) -> int:
         """The node that a node was collapsed to, itself if it was not."""
@@ -38,17 +39,11 @@ class PolygonEdits:
             node = self.went[node]
         return node
 
-    def area_vector(self, face: list[int]) -> Floats:
-        """Of a polygon."""
-        x, y, z = self.positions[face].T
-        a, b, c = np.roll(x, -1), np.roll(y, -1), np.roll(z, -1)
-        return np.array([y @ c - z @ b, z @ a - x @ c, x @ b - y @ a]) / 2
-
     def area(self, number: int) -> float:
         """Of a face, along the normal that it had at first."""
         first = self.normals[number]
         size = float(np.linalg.norm(first))
-        return float(self.area_vector(self.faces[number]) @ first) / size if size else 0.0
+        return float(area_vector(self.positions, self.faces[number]) @ first) / size if size else 0.0
 
     def boundary_faces(self) -> list[int]:
         """Faces with a node on the boundary."""
@@ -71,20 +66,21 @@ class PolygonEdits:
         """Of an edge."""
         return float(np.linalg.norm(self.positions[edge[0]] - self.positions[edge[1]]))
 
-    def collapse(self, edge: Edge, inner: bool) -> bool:
+    def collapse(self, edge: Edge) -> bool:
         """Collapses an edge to the end that is to stay: a fixed one, or one on the boundary.
 
         Args:
-            edge: two nodes.
-            inner: whether it has faces on both sides.
+            edge: two nodes, in either order.
 
         Returns:
-            Whether that left a manifold without faces turned over; otherwise nothing has changed.
+            Whether it is an edge and that left a manifold without faces turned over; otherwise nothing has changed.
         """
         stays, goes = edge
         if self._rank(goes) > self._rank(stays):
             stays, goes = goes, stays
-        if self.fixed[goes] or (inner and self.on_boundary[stays] and self.on_boundary[goes]):
+        shared = self.around[stays] & self.around[goes]
+        sides = sum(self._has(number, edge) or self._has(number, edge[::-1]) for number in shared)
+        if not sides or self.fixed[goes] or (sides == 2 and self.on_boundary[stays] and self.on_boundary[goes]):
             return False
         changed: dict[int, list[int]] = {}
         for number in self.around[stays] | self.around[goes]:
@@ -120,7 +116,7 @@ class PolygonEdits:
             face = self.faces[number]
             if len(face) > 3 and len(self.around[node]) == 1 and not self.fixed[node]:
                 without = [other for other in face if other != node]
-                if self.area_vector(without) @ self.normals[number] > 0:
+                if area_vector(self.positions, without) @ self.normals[number] > 0:
                     self.faces[number] = without
                     del self.around[node]
 
@@ -136,7 +132,7 @@ class PolygonEdits:
 
     def _keeps_side(self, number: int, face: list[int]) -> bool:
         normal = self.normals[number]
-        area = self.area_vector(face)
+        area = area_vector(self.positions, face)
         return float(area @ normal) > 0.2 * float(np.linalg.norm(area)) * float(np.linalg.norm(normal))
 
     def _is_fan(self, node: int, changed: dict[int, list[int]]) -> bool:

@@ -71,6 +71,7 @@ def principal_quads(
         made.to(vertices.device),
         pieces.places.to(vertices),
         pieces.indices.to(vertices),
+        surface,
         report,
         [*surface.notes, *pieces.notes],
     )

@@ -13,10 +13,9 @@ from .._one_mesh import one_mesh
 from ..energies import NormalVariation, TotalAbsoluteCurvature
 from ..geometry import ReferenceSurface, edge_lengths, face_centres, planarity
 from ..topology import Topology
-from .components import ReadSurface, read_surface
+from .components import ReadSurface
 from .measures import angles_to_directions
 from .quad_mesh import QuadMesh
-from .settings import MeshingSettings
 from .verification import shape_of
 
 
@@ -75,17 +74,15 @@ def _counts(indices: Tensor) -> dict[str, int]:
     return {f"{value:g}": count for value, count in zip(values.tolist(), counts.tolist(), strict=True)}
 
 
-def measure_mesh_on(vertices: Tensor, mesh: QuadMesh, surface: tuple[Tensor, Topology]) -> dict[str, Any]:
+def measure_mesh_on(vertices: Tensor, mesh: QuadMesh) -> dict[str, Any]:
     """The report of a principal mesh whose vertices have moved, against the surface that it was made from.
 
     Args:
         vertices: (V, 3) where they are now.
         mesh: as it was made.
-        surface: vertices and topology that it was made from.
 
     Raises:
         ShapeError: if the vertices do not fit the mesh.
     """
-    read = read_surface(*surface, MeshingSettings())
     points, topology = one_mesh(vertices, mesh.topology).cpu().double(), mesh.topology.to("cpu")
-    return measure(points, topology, read, mesh.report["spacing"], mesh.singular_indices.cpu().double())
+    return measure(points, topology, mesh.surface, mesh.report["spacing"], mesh.singular_indices.cpu().double())

@@ -17,6 +17,9 @@ from .cut_graph import CutGraph
 from .integers import IntegerSplit
 from .seams import ROTATIONS, Seams
 
+WANTED = np.array([1.0, 0.0, 0.0, 1.0])
+"""Jacobian of a map as wanted: gradients of the first coordinate along and across the field, then of the second."""
+
 _TRIED = 16  # whole vectors, until no triangle is turned over
 _THIN = 0.05  # of the area wanted, below which triangles are counted as nearly turned over
 
@@ -127,25 +130,30 @@ class MapProblem:
         return np.asarray(doubled / (2 * self.frames.areas * self.density.prod(1)))
 
     def _rows(self) -> tuple[sp.csr_matrix, Floats]:
-        """Four rows for every face: gradients along and across the field, of both coordinates."""
-        count = len(self.density)
-        turned = self.frames.gradients * np.exp(-1j * self.graph.angles)[:, None]
-        size = np.sqrt(self.frames.areas / self.density.prod(1))[:, None]
-        face, corner = np.repeat(np.arange(count), 3), self.seams.copies.ravel()
-        entries, right = [], np.zeros((4, count))
-        for coordinate in (0, 1):
-            along, across = (turned.real, turned.imag) if coordinate == 0 else (turned.imag, turned.real)
-            right[2 * coordinate] = size[:, 0] * self.density[:, coordinate]
-            for row, part in (
-                (2 * coordinate, along),
-                (2 * coordinate + 1, np.sqrt(self.anisotropy)[:, None] * across),
-            ):
-                for k in np.flatnonzero(self.shear[coordinate]):
-                    values = (part * size * self.shear[coordinate, k]).ravel()
-                    entries.append((row * count + face, 2 * corner + k, values))
-        rows, columns, numbers = (np.concatenate(part) for part in zip(*entries, strict=True))
-        shape = (4 * count, 2 * len(self.seams.vertex))
-        return sp.csr_matrix((numbers, (rows, columns)), shape=shape), right.ravel()
+        """Least squares of the Jacobians of all faces."""
+        faces = np.arange(len(self.density))
+        lengths = np.sqrt(self.frames.areas / self.density.prod(1))[:, None] * self.density
+        weights = lengths.T[[0, 0, 1, 1]] * np.sqrt(self.weights(faces))
+        return (sp.diags(weights.ravel()) @ self.jacobians(faces)).tocsr(), (weights * WANTED[:, None]).ravel()
+
+    def weights(self, faces: Ints) -> Floats:
+        """(4, n) of the rows of :meth:`jacobians`: those of wrong directions over those of wrong lengths."""
+        one, other = np.ones(len(faces)), self.anisotropy[faces]
+        return np.stack([one, other, other, one])
+
+    def jacobians(self, faces: Ints) -> sp.csr_matrix:
+        """(4n, 2N) gradients over those wanted: of the first coordinate along and across, then of the second."""
+        count = len(faces)
+        turned = self.frames.gradients[faces] * np.exp(-1j * self.graph.angles[faces])[:, None]
+        face, corner = np.repeat(np.arange(count), 3), self.seams.copies[faces].ravel()
+        entries = []
+        for row, coordinate in enumerate((0, 0, 1, 1)):
+            part = turned.imag if row % 2 else turned.real
+            scaled = part / self.density[faces, coordinate][:, None]
+            for k in np.flatnonzero(self.shear[coordinate]):
+                entries.append((row * count + face, 2 * corner + k, (scaled * self.shear[coordinate, k]).ravel()))
+        rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
+        return sp.csr_matrix((values, (rows, columns)), shape=(4 * count, 2 * len(self.seams.vertex)))
 
 
 def badness(found: SeamlessMap) -> tuple[int, float]:

@@ -55,13 +55,12 @@ def translation_terms(graph: CutGraph, edge: int) -> Terms:
     return {path: 1.0 if along else -ROTATIONS[graph.quarters[edge]]}
 
 
-def find_seams(frames: FaceFrames, graph: CutGraph, preferred: dict[int, tuple[int, int]] | None = None) -> Seams:
+def find_seams(frames: FaceFrames, graph: CutGraph) -> Seams:
     """The copies of a mesh that is cut open.
 
     Args:
         frames: of the triangles.
         graph: the cut.
-        preferred: for some vertices the corner, face and number, whose copy has the value of the vertex itself.
     """
     copies = _copies(frames, graph)
     count = int(copies.max()) + 1
@@ -69,8 +68,6 @@ def find_seams(frames: FaceFrames, graph: CutGraph, preferred: dict[int, tuple[i
     vertex[copies.ravel()] = frames.triangles.ravel()
     first = np.zeros(len(frames.points), np.int64)
     first[vertex[::-1]] = np.arange(count)[::-1]
-    for at, corner in (preferred or {}).items():
-        first[at] = copies[corner]
     unit: np.ndarray = np.ones(count, complex)
     terms: dict[int, Terms] = {}
     closures: list[tuple[int, complex, Terms]] = []

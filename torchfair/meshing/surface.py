@@ -45,7 +45,7 @@ class DesignSurface:
     def directions(self, rings: int | Literal["auto"]) -> tuple[Directions, int]:
         """Principal directions by so many rings, and their number; ``"auto"`` chooses it by the noise."""
         number = rings_for_noise(self.vertices, self.topology) if rings == "auto" else rings
-        return directions_of(self.vertices, self.topology, self.frames, number), number
+        return directions_of(self.frames, number), number
 
     def cut_finer(self, directions: Directions, spacing: float) -> tuple[DesignSurface, Directions]:
         """Triangles fine enough for edges of a length, on the same flat pieces."""

@@ -40,12 +40,17 @@ def read_settings(path: str | os.PathLike[str], kind: type[S], *, job: str | Non
 
         settings = read_settings("smooth/report.json", FairSettings)
     """
+    return _made(read_fields(path, kind, job=job), kind, os.fspath(path))
+
+
+def read_fields(path: str | os.PathLike[str], kind: type[Any], *, job: str | None = None) -> dict[str, Any]:
+    """What a file of settings names: values by field, with dots; see :func:`read_settings`."""
     document = _document(Path(path))
     if isinstance(document.get("settings"), Mapping):  # a report
         if job is not None and document.get("job", job) != job:
             raise SettingsError(f"{path}: the report of the job '{document['job']}', not of '{job}'")
         document = document["settings"]
-    return settings_from(document, kind, where=os.fspath(path))
+    return _fields_from(document, kind, os.fspath(path))
 
 
 def settings_from(values: Mapping[str, Any], kind: type[S], *, where: str = "settings") -> S:
@@ -59,6 +64,11 @@ def settings_from(values: Mapping[str, Any], kind: type[S], *, where: str = "set
     Raises:
         SettingsError: see :func:`read_settings`.
     """
+    return _made(_fields_from(values, kind, where), kind, where)
+
+
+def _fields_from(values: Mapping[str, Any], kind: type[Any], where: str) -> dict[str, Any]:
+    """Values by field, with dots, in the unit of the library."""
     fields = fields_of(kind)
     given = {}
     for name, value in _flat(values, fields, where).items():
@@ -68,6 +78,10 @@ def settings_from(values: Mapping[str, Any], kind: type[S], *, where: str = "set
         except ValueError as error:
             raise SettingsError(f"{where}: {field.name}: {error}") from None
         given[field.name] = math.radians(found) if in_degrees else found
+    return given
+
+
+def _made(given: Mapping[str, Any], kind: type[S], where: str) -> S:
     try:
         return with_fields(kind(), given)
     except SettingsError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -42,7 +43,10 @@ def _number(word: str, preset: str, numbers: Mapping[str, inspect.Parameter]) ->
         raise SettingsError(f"numbers of the preset '{preset}' are {', '.join(numbers)}, as NAME=X, got '{word}'")
     kind = type(numbers[key].default)
     try:
-        return key, kind(value)
+        found = kind(value)
     except ValueError:
+        found = math.nan
+    if not 0.0 <= found < math.inf:
         wanted = "a whole number" if kind is int else "a number"
-        raise SettingsError(f"preset '{preset}': {key} must be {wanted}, got '{value}'") from None
+        raise SettingsError(f"preset '{preset}': {key} must be {wanted} of at least 0, got '{value}'")
+    return key, found

@@ -10,7 +10,7 @@ from torch import Tensor
 from ...curves import ClosedCurve
 from ...energies import total_absolute_curvature
 from ...errors import MeshError, SettingsError
-from ...projection import Callback
+from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ...subdivision import catmull_clark, loop
 from ...topology import Topology
@@ -19,7 +19,7 @@ from ..handles import refuse_unreachable_handles
 from ..job import JobResult, Level, Plan, Promise, Recipe, Stage, solved
 from .even_mesh import even_mesh
 from .follower import FormFollower, SettlingPlan
-from .measures import form_measures, form_promises
+from .measures import form_measures, form_promises, warp_notes
 from .other_starts import Start, other_starts
 from .plan import FormPlan
 from .problem import FormProblem, staying_vertices
@@ -143,6 +143,12 @@ class FormRecipe(Recipe[FormSettings]):
         """See ``form_promises``."""
         handles, normals = bool(self.pulls.pulled.any()), self.problem.has_tangent_planes
         return form_promises(self.settings, before, after, handles=handles, normals=normals, remesh=self._remesh)
+
+    def level(self, state: State, before: dict[str, float], runs: list[ProjectionResult], like: Tensor) -> Level:
+        """What is returned of a state; notes where faces have lost their planarity."""
+        level = super().level(state, before, runs, like)
+        self.notes += warp_notes(level.before, level.after)
+        return level
 
     def refined(self, state: State) -> FormRecipe:
         """By Loop or Catmull-Clark subdivision; new boundary vertices are put on the curves, by arc length."""

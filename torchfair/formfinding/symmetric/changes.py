@@ -28,8 +28,8 @@ class Changes:
         return ReferenceSurface(self._start, self._topology)
 
     @cached_property
-    def _kinds(self) -> Tensor:
-        return _kinds(classify_stars(self._start, self._topology))
+    def _classes(self) -> StarClasses:
+        return classify_stars(self._start, self._topology)
 
     def measures(self, vertices: Tensor) -> dict[str, float]:
         """Of vertices (V, 3).
@@ -42,7 +42,8 @@ class Changes:
         """
         moved: Tensor = torch.linalg.vector_norm(vertices - self._start, dim=1)
         away = self._surface.closest(vertices).distances
-        classes = classify_stars(vertices, self._topology)
+        same = torch.equal(vertices, self._start)
+        classes = self._classes if same else classify_stars(vertices, self._topology)
         return {
             "largest_displacement": float(moved.max()),
             "mean_displacement": float(moved.mean()),
@@ -51,7 +52,7 @@ class Changes:
             "good_saddles": float(classes.good.sum()),
             "bad_saddles": float(classes.bad_saddles.sum()),
             "neither_stars": float(classes.is_kind(StarKind.NEITHER).sum()),
-            "changed_stars": float((_kinds(classes) != self._kinds).sum()),
+            "changed_stars": float((_kinds(classes) != _kinds(self._classes)).sum()),
         }
 
 

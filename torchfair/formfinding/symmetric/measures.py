@@ -10,7 +10,7 @@ from torch import Tensor
 from ...constraints.principal_symmetric import between_stars, star_numbers, star_stencil
 from ...constraints.saddle_sides import beyond_tangent_plane, is_negative
 from ...energies import normal_variation, total_absolute_curvature
-from ...geometry import corner_angles, edge_lengths, face_normals
+from ...geometry import corner_angles, edge_lengths, face_areas, face_normals
 from ...geometry._ops import cross, dot
 from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
@@ -51,9 +51,9 @@ def symmetric_measures(
         those with an angle sum above 2 pi. ``saddle_side_share``: share of them whose principal neighbours lie beyond
         the tangent plane (1 if there are none). ``crossing_pyramids_negative`` and ``crossing_pyramids``: negative
         stars, and all interior vertices, whose normal pyramid intersects itself. ``normal_variation`` (E) and
-        ``total_absolute_curvature`` (C) and their quotient ``energy_over_curvature``; ``mean_edge_length``;
-        ``smallest_angle_degrees``; ``flipped_faces``: those that look the other way than the faces beside them;
-        ``largest_handle_distance``.
+        ``total_absolute_curvature`` (C) and their quotient ``energy_over_curvature``; ``area``;
+        ``mean_edge_length``; ``smallest_angle_degrees``; ``flipped_faces``: those that look the other way than the
+        faces beside them; ``largest_handle_distance``.
     """
     topology = principal.topology
     residuals = condition_residuals(vertices, principal, stars)
@@ -76,6 +76,7 @@ def symmetric_measures(
         "normal_variation": energy,
         "total_absolute_curvature": curvature,
         "energy_over_curvature": energy / curvature if curvature > 0.0 else math.nan,
+        "area": float(face_areas(vertices, topology).sum()),
         "mean_edge_length": float(edge_lengths(vertices, topology).mean()),
         "smallest_angle_degrees": math.degrees(float(angles.min())),
         "flipped_faces": float(_flipped(vertices, topology).sum()),

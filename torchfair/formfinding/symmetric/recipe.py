@@ -53,6 +53,7 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
             and unit normals (:func:`torchfair.geometry.closest_on`).
         rounds: How often a shape is looked for at most; None for as often as the settings say.
         changes: Compares meshes with the start.
+        first: Measures of the mesh that was given, of the coarsest level; None on that level itself.
     """
 
     name = "symmetric"
@@ -74,6 +75,7 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
         self.changes = Changes(self.given, self.topology)
         self.reference = reference
         self.rounds: int | None = None
+        self.first: Mapping[str, float] | None = None
         surface = None if reference is None else surface_of(normalised_reference(reference, self.unit))
         self.problem = SymmetricProblem(
             self.start, self.principal, self.stars, self._fixed(fixed), self.pulls, surface, self.settings
@@ -162,8 +164,9 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
     def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
         """See ``symmetric_promises``."""
         has_handles = bool(self.pulls.pulled.any())
-        keeps_shape = self.problem.keeps_shape
-        return symmetric_promises(self.settings, before, after, has_handles=has_handles, keeps_shape=keeps_shape)
+        return symmetric_promises(
+            self.settings, before, after, self.first, has_handles=has_handles, keeps_shape=self.problem.keeps_shape
+        )
 
     def normals(self, vertices: Tensor) -> Tensor:
         """(V, 3) unit normals n(v) of vertices (V, 3); see :func:`~torchfair.formfinding.strip_normals`."""

@@ -29,7 +29,8 @@ def refined(recipe: SymmetricRecipe, vertices: Tensor) -> SymmetricRecipe:
     stays, along = recipe.stays(), _on_boundary(topology)
     step = loop(topology, boundary="interpolate", corners=boundary_corners(vertices, topology, BOUNDARY_CORNER))
     normals = BoundaryNormals.of(vertices, topology).at_boundary
-    keep = near(topology, topology.is_boundary_vertex | stays | pulls.held, _KEPT_RINGS)
+    kept = topology.is_boundary_vertex | stays | pulls.held
+    keep = None if recipe.problem.keeps_shape else near(topology, kept, _KEPT_RINGS)
     finer = type(recipe)(
         interpolate_vertices(step, vertices, normals, keep=keep),
         principal.refine(step),
@@ -39,6 +40,7 @@ def refined(recipe: SymmetricRecipe, vertices: Tensor) -> SymmetricRecipe:
         settings=recipe.settings,
     )
     finer.pull(recipe.handles)
+    finer.first = recipe.first or recipe.before()
     finer.problem.steered = recipe.problem.steered
     finer.pulls.hold(torch.nonzero(_carried(step, pulls.held, along)).squeeze(1))
     return finer

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from ...boundary import boundary_pieces
-from ...geometry.spline_curves import SplineCurves
-from ...subdivision import Refinement
-from ...topology import Topology
+from ..boundary import boundary_pieces
+from ..constraints.gliding import CurveFeet
+from ..geometry.spline_curves import SplineCurves
+from ..subdivision import Refinement
+from ..topology import Topology
 
 
 class BoundaryCurves(NamedTuple):
@@ -39,6 +40,11 @@ class BoundaryCurves(NamedTuple):
     def splines(self) -> SplineCurves | None:
         """The curves; None where there is no vertex between corners."""
         return SplineCurves(self.points, self.closed) if bool((self.owners >= 0).any()) else None
+
+    def feet(self) -> CurveFeet | None:
+        """Closest points on their curves of all vertices between corners; None where there is no such vertex."""
+        curves, rows = self.splines(), torch.nonzero(self.owners >= 0).squeeze(1)
+        return None if curves is None else CurveFeet(curves, rows, self.owners[rows])
 
     def mapped(self, function: Callable[[Tensor], Tensor]) -> BoundaryCurves:
         """In another unit."""
