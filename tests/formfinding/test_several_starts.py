@@ -164,6 +164,8 @@ def test_closed_meshes_and_other_curves_are_refused() -> None:
     for other in (ring(3.0, 0.0), ring(1.0, 2.0), ring(0.4, 0.0)):
         with pytest.raises(MeshError, match="is not the boundary of the mesh"):
             minimise_absolute_curvature(vertices, topology, curves=[other])
+    hexagon = start_surface([ring(1.0, 0.0)], 7)  # its vertices are far from each other, and on the curve
+    FormRecipe(*hexagon, curves=[ring(1.0, 0.0)])
     near = minimise_absolute_curvature(vertices, topology, curves=[ring(1.05, 0.0)])
     assert near.after["largest_boundary_distance"] < 1e-9
     two = [ring(1.0, 0.0), ring(1.0, 1.0)]
