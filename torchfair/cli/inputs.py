@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from typing import TYPE_CHECKING
 
@@ -56,17 +57,58 @@ def add_handles(parser: argparse.ArgumentParser) -> None:
 def read_handles(arguments: argparse.Namespace, mesh: PolygonMesh) -> dict[int, list[float]]:
     """Where ``--handle`` pulls vertices of a mesh, which are counted as in its file."""
     given = [_vertex_target(*words) for words in arguments.handle]
-    return {_in_mesh(vertex, mesh): place for vertex, place in given}
+    return {_in_mesh(vertex, mesh, "--handle"): place for vertex, place in given}
 
 
-def _in_mesh(vertex: int, mesh: PolygonMesh) -> int:
-    """The number in a mesh of a vertex of its file."""
+def _in_mesh(vertex: int, mesh: PolygonMesh, option: str) -> int:
+    """The number in a mesh of a vertex of its file, which an option names."""
     if mesh.vertex_map is None or vertex >= len(mesh.vertex_map):
         return vertex
     number = int(mesh.vertex_map[vertex])
     if number < 0:
-        raise CommandError(f"--handle: vertex {vertex} is one that no face uses, and was dropped by --repair")
+        raise CommandError(f"{option}: vertex {vertex} is one that no face uses, and was dropped by --repair")
     return number
+
+
+def add_fixed(parser: argparse.ArgumentParser) -> None:
+    """The option to keep vertices where they are."""
+    parser.add_argument("--fix", nargs="+", action="append", default=[], metavar="WORD", help="vertices of INPUT that "
+        "stay: numbers (counted from 0), 'near X Y Z' for the nearest one, or 'box X Y Z X Y Z' for all between two "
+        "opposite corners; repeatable")  # fmt: skip
+
+
+def read_fixed(arguments: argparse.Namespace, mesh: PolygonMesh) -> list[int]:
+    """Which vertices of a mesh ``--fix`` keeps; only those of faces are found by position."""
+    found: set[int] = set()
+    for words in arguments.fix:
+        found |= _fixed_vertices(words, mesh)
+    return sorted(found)
+
+
+def _fixed_vertices(words: list[str], mesh: PolygonMesh) -> set[int]:
+    kind, *rest = words
+    try:
+        if kind not in ("near", "box"):
+            return {_in_mesh(count(word), mesh, "--fix") for word in words}
+        numbers = [float(word) for word in rest]
+        if len(numbers) != (3 if kind == "near" else 6) or not all(map(math.isfinite, numbers)):
+            raise ValueError
+    except (argparse.ArgumentTypeError, ValueError):
+        expected = "vertex numbers, 'near X Y Z' or 'box X Y Z X Y Z'"
+        raise CommandError(f"--fix: expected {expected}, got '{' '.join(words)}'") from None
+    places, used = mesh.vertices.tolist(), (mesh.topology.valences > 0).tolist()
+    if kind == "near":
+        distances = [math.dist(place, numbers) if on else math.inf for place, on in zip(places, used, strict=True)]
+        return {distances.index(min(distances))}
+    sides = [sorted(pair) for pair in zip(numbers[:3], numbers[3:], strict=True)]
+    inside = {
+        number
+        for number, (place, on) in enumerate(zip(places, used, strict=True))
+        if on and all(low <= x <= high for x, (low, high) in zip(place, sides, strict=True))
+    }
+    if not inside:
+        raise CommandError(f"--fix box: no vertex of the mesh is between {numbers[:3]} and {numbers[3:]}")
+    return inside
 
 
 def add_levels(parser: argparse.ArgumentParser) -> None:

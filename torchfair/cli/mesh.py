@@ -30,7 +30,7 @@ NAME = "torchfair mesh"
 _DESCRIPTION = (
     "Makes a mesh of a surface whose edges follow its principal curvature lines: quads, which are then nearly planar "
     "and have the least E of all, or a half-shifted lattice of triangles, from which 'torchfair symmetric' starts. "
-    "Vertices lie on the surface; corners of the boundary stay, and parts of it that follow a direction become lines "
+    "Vertices lie on a smooth surface through those given; corners of the boundary stay, and parts of it that follow a direction become lines "
     "of the mesh. The topology is that of the surface, or nothing is written."
 )
 _ROWS = {
@@ -44,6 +44,9 @@ _ROWS = {
     "total_absolute_curvature": "C of the surface",
     "variation_over_curvature": "E/C",
     "distance_max": "largest distance from the surface, in mean edges",
+    "spacing_shortest": "shortest spacing asked for",
+    "spacing_longest": "longest ...",
+    "range_share": "share of the surface at the ends of the range",
 }
 
 
@@ -156,7 +159,7 @@ def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
 def table(report: Mapping[str, Any]) -> list[str]:
     """What was measured on a principal mesh, one line for each."""
     width = max(map(len, _ROWS.values()))
-    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items()]
+    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items() if name in report]
     found = ", ".join(f"{count} of index {index}" for index, count in report["singular"].items())
     return [*lines, f"{'singular points':<{width}}  {found or 'none':>10}"]
 

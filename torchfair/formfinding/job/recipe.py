@@ -178,6 +178,10 @@ class Recipe(ABC, Generic[S]):
         """The same job on a refinement of the mesh of a state."""
         raise MeshError(f"the job '{self.name}' works on one mesh and does not refine it")
 
+    def renewed(self, state: State) -> Recipe[S] | None:
+        """The same job with other faces on the surface of a state, asked for where promises are broken; None: none."""
+        return None
+
     def snapshot(self) -> Callable[[], None]:
         """A function that puts back what runs change in the job itself, beside pulls and settings."""
         return lambda: None
