@@ -18,6 +18,7 @@ from .matchings import QUARTER, vertex_charges
 _LOOSE = 0.05  # confidence beside moved singular vertices, relative
 _RINGS = 2  # around them
 _ROUNDS = 8
+_MOST_POSITIVE = {4: 1, 2: 2}  # four times the index where three quads or triangles meet, by symmetry
 _MOST_NEGATIVE = -4  # four times the index of a merged vertex: eight quads meet
 
 
@@ -29,6 +30,7 @@ def merge_singularities(
     smoothing: float,
     radius: float,
     symmetry: Symmetry = 4,
+    stay: Bools | None = None,
 ) -> tuple[Floats, Ints]:
     """Merges singular vertices of a field within a radius: opposite ones cancel, negative ones become one.
 
@@ -43,6 +45,7 @@ def merge_singularities(
         smoothing: as for the field.
         radius: along edges.
         symmetry: of the field, 2 or 4.
+        stay: (V,) bool: vertices that are not merged with others; none by default.
 
     Returns:
         Angles (F,) and matchings (I,); those given, where nothing is to be merged.
@@ -51,9 +54,10 @@ def merge_singularities(
     trust = np.bincount(corners, np.repeat(directions.confidence, 3), size) / np.maximum(
         np.bincount(corners, minlength=size), 1
     )
-    moved, touched = matched, np.zeros(size, bool)
+    moved, touched = _split(frames, matched, vertex_charges(frames, angles, matched), trust, radius, symmetry)
     for _ in range(_ROUNDS):
-        again, beside = _merged(frames, moved, vertex_charges(frames, angles, moved), trust, radius)
+        charges = vertex_charges(frames, angles, moved)
+        again, beside = _merged(frames, moved, charges if stay is None else np.where(stay, 0, charges), trust, radius)
         if not beside.any():
             break
         moved, touched = again, touched | beside
@@ -69,10 +73,7 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
     singular = np.flatnonzero(charges)
     if len(singular) < 2:
         return matched, touched
-    inner = ~frames.is_boundary[frames.edges].any(1)
-    (v, w), lengths = frames.edges[inner].T, frames.lengths[inner]
-    graph = sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(size, size))
-    distance, before = dijkstra(graph, indices=singular, limit=radius, return_predecessors=True)
+    distance, before = dijkstra(_inner_edges(frames), indices=singular, limit=radius, return_predecessors=True)
     near = distance[:, singular]
     rows, columns = np.nonzero(np.triu(np.isfinite(near), 1))
     free = set(singular.tolist())
@@ -92,6 +93,48 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
         steps += [(b, a, int(charges[start])) for a, b in itertools.pairwise(path[middle:])]
         touched[path] = True
     return _carried(frames, matched, steps), touched
+
+
+def _split(
+    frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, radius: float, symmetry: Symmetry
+) -> tuple[Ints, Bools]:
+    """Matchings with vertices of too large an index split, where fewer than three faces would meet.
+
+    One part after the other goes as far as the radius, each as far from those before as it can, among vertices inside.
+    """
+    touched = np.zeros(len(frames.points), bool)
+    most = _MOST_POSITIVE[symmetry]
+    for vertex in np.flatnonzero(charges > most).tolist():
+        graph = _inner_edges(frames)
+        distance, before = dijkstra(graph, indices=vertex, limit=2 * radius, return_predecessors=True)
+        near = np.flatnonzero(np.isfinite(distance) & (distance <= radius) & (charges == 0))
+        steps: list[tuple[int, int, int]] = []
+        taken: list[int] = []
+        for _ in range((int(charges[vertex]) - 1) // most):
+            if not len(near):
+                break
+            apart = np.min([distance[near], *(_apart(frames, near, other) for other in taken)], axis=0)
+            goal = int(near[np.argmax(apart)])
+            taken.append(goal)
+            path = [goal]
+            while path[-1] != vertex:
+                path.append(int(before[path[-1]]))
+            steps += [(a, b, most) for a, b in itertools.pairwise(path[::-1])]
+            touched[path] = True
+        matched = _carried(frames, matched, steps)
+    return matched, touched
+
+
+def _apart(frames: FaceFrames, vertices: Ints, other: int) -> Floats:
+    return np.asarray(np.linalg.norm(frames.points[vertices] - frames.points[other], axis=1))
+
+
+def _inner_edges(frames: FaceFrames) -> sp.csr_matrix:
+    """(V, V) lengths of the edges between vertices that are not on the boundary."""
+    inner = ~frames.is_boundary[frames.edges].any(1)
+    (v, w), lengths = frames.edges[inner].T, frames.lengths[inner]
+    size = len(frames.points)
+    return sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(size, size))
 
 
 def _carried(frames: FaceFrames, matched: Ints, steps: list[tuple[int, int, int]]) -> Ints:

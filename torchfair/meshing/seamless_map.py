@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,15 +13,16 @@ import torch
 from ..fields.frames import FaceFrames, Floats, Ints
 from ..fields.matchings import QUARTER
 from ..linear import Factor, RslabDirect, factorise
-from .closest_vectors import closest_vectors
 from .cut_graph import CutGraph
-from .integers import IntegerSplit
+from .integers import IntegerSplit, real_form
 from .seams import ROTATIONS, Seams
+from .separation import gaps, separate_vectors
 
 WANTED = np.array([1.0, 0.0, 0.0, 1.0])
 """Jacobian of a map as wanted: gradients of the first coordinate along and across the field, then of the second."""
 
 _TRIED = 16  # whole vectors, until no triangle is turned over
+_NEAR = 2.5  # spacings: singular vertices within that are kept apart
 _THIN = 0.05  # of the area wanted, below which triangles are counted as nearly turned over
 
 
@@ -69,6 +71,21 @@ class SeamlessMap:
         return np.where(self.graph.cut, np.rint(steps.real) + 1j * np.rint(steps.imag), 0)
 
 
+class _Optimum(NamedTuple):
+    """Values of copies as whole numbers y say, all others following: ``base + moves @ y``.
+
+    Attributes:
+        base: (2N,) where all whole numbers are zero.
+        moves: (2N, k) by each whole number.
+        metric, target: the least squares are ``(y - target)^T metric (y - target)``, (k, k) and (k,).
+    """
+
+    base: Floats
+    moves: Floats
+    metric: Floats
+    target: Floats
+
+
 @dataclass(frozen=True, eq=False)
 class MapProblem:
     """Least squares for the gradients of a seamless map, factorised once.
@@ -93,6 +110,28 @@ class MapProblem:
 
         There is one only if it has nothing turned over.
         """
+        optimum = self._optimum
+        if not len(optimum.target):
+            return [self.map_of(optimum.base.copy())]
+        near = _NEAR * float(np.median(self.density.prod(1))) ** -0.5
+        between = real_form(gaps(self.frames, self.graph, self.seams, near))
+        rows, offsets = between @ optimum.moves, between @ optimum.base
+        found = []
+        for vector in separate_vectors(optimum.metric, optimum.target, rows, offsets)[:_TRIED]:
+            found.append(self.map_of(optimum.base + optimum.moves @ vector))
+            if found[-1].is_sound:
+                return [found[-1]]
+        return sorted(found, key=badness)
+
+    @property
+    def real_jacobians(self) -> Floats:
+        """(4, F) of the optimum whose whole numbers may be any numbers, rows as in :meth:`jacobians`."""
+        optimum = self._optimum
+        parts = optimum.base + optimum.moves @ optimum.target
+        return np.asarray(self.jacobians(np.arange(len(self.density))) @ parts).reshape(4, -1)
+
+    @cached_property
+    def _optimum(self) -> _Optimum:
         rows, right = self._rows()
         free = (rows @ self.split.free).tocsc()
         whole = np.asarray((rows @ self.split.whole) @ self.split.basis)
@@ -100,26 +139,22 @@ class MapProblem:
         factor = factorise((free.T @ free).tocsr(), solver="rslab" if RslabDirect.available() else "scipy")
         best = _solve(factor, free.T @ right)
         base = self.split.free @ best + self.split.fixed
-        if not whole.shape[1]:
-            return [self.map_of(base)]
+        count = whole.shape[1]
+        if not count:
+            return _Optimum(base, np.zeros((len(base), 0)), np.zeros((0, 0)), np.zeros(0))
         mixed = free.T @ whole
         answers = _solve(factor, mixed)
         metric = whole.T @ whole - mixed.T @ answers
         metric = (metric + metric.T) / 2
         scale = np.linalg.eigvalsh(metric)[-1]
-        target = np.linalg.lstsq(metric + 1e-13 * scale * np.eye(len(metric)), whole.T @ right - mixed.T @ best)[0]
+        target = np.linalg.lstsq(metric + 1e-13 * scale * np.eye(count), whole.T @ right - mixed.T @ best)[0]
         moves = np.asarray(self.split.whole @ self.split.basis - self.split.free @ answers)
-        found = []
-        for vector in closest_vectors(metric / scale, target).vectors[:_TRIED]:
-            found.append(self.map_of(base + moves @ vector))
-            if found[-1].is_sound:
-                return [found[-1]]
-        return sorted(found, key=badness)
+        return _Optimum(base, moves, metric / scale, target)
 
     def map_of(self, parts: Floats) -> SeamlessMap:
         """The map whose copies have real and imaginary parts (2N,) in turn."""
         values = parts[::2] + 1j * parts[1::2]
-        at_singular = self.graph.singular[self.seams.vertex]
+        at_singular = self.graph.nodes[self.seams.vertex]
         values[at_singular] = np.rint(values[at_singular].real) + 1j * np.rint(values[at_singular].imag)
         return SeamlessMap(self.frames, self.graph, self.seams, values, self.relative_areas(values))
 
@@ -132,8 +167,7 @@ class MapProblem:
     def _rows(self) -> tuple[sp.csr_matrix, Floats]:
         """Least squares of the Jacobians of all faces."""
         faces = np.arange(len(self.density))
-        lengths = np.sqrt(self.frames.areas / self.density.prod(1))[:, None] * self.density
-        weights = lengths.T[[0, 0, 1, 1]] * np.sqrt(self.weights(faces))
+        weights = np.sqrt(self.frames.areas / self.frames.areas.mean() * self.weights(faces))
         return (sp.diags(weights.ravel()) @ self.jacobians(faces)).tocsr(), (weights * WANTED[:, None]).ravel()
 
     def weights(self, faces: Ints) -> Floats:

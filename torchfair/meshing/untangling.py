@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from scipy.optimize import minimize
 
 from ..fields.frames import Bools, Floats, Ints
+from .relaxation import grown
 from .seamless_map import WANTED, MapProblem, SeamlessMap, badness
 
 _RINGS = (3, 6, 12)  # around triangles turned over, tried one after the other
@@ -61,7 +62,7 @@ class _Patch:
         frames, triangles = found.frames, found.frames.triangles
         inside: Bools = np.asarray(np.isin(triangles, found.branches).any(1))
         inside[found.flips] = True
-        inside = _grown(triangles, inside, len(frames.points), rings)
+        inside = grown(triangles, inside, len(frames.points), rings)
         rim = np.zeros(len(frames.points), bool)
         rim[triangles[~inside]] = True
         faces = np.flatnonzero(inside)
@@ -116,15 +117,6 @@ class _Patch:
         energy = self.areas @ (size / chi + _ALIGNMENT * (self.weights * off**2).sum(0))
         slope = self.areas * (slope + 2 * _ALIGNMENT * self.weights * off)
         return float(energy), np.asarray(self.slope.T @ slope.ravel())
-
-
-def _grown(triangles: Ints, inside: Bools, num_vertices: int, rings: int) -> Bools:
-    """Triangles within rings of neighbours of some."""
-    for _ in range(rings):
-        near = np.zeros(num_vertices, bool)
-        near[triangles[inside]] = True
-        inside = np.asarray(near[triangles].any(1))
-    return inside
 
 
 def _movable(problem: MapProblem, copies: Ints, allowed: Bools) -> Ints:
