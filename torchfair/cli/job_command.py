@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -100,6 +101,8 @@ class JobCommand(ABC):
         request = self.read(arguments, settings)
         settings = request.settings or settings
         outputs.make_folders()
+        for warning in request.warnings:
+            print(f"{self.name}: warning: {warning}", file=sys.stderr, flush=True)
         result = self._solve(request, settings)
         outputs.write_mesh(request, result)
         missed = missed_lines(result, getattr(arguments, "levels", 0))
