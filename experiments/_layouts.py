@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+from torchfair.meshing import QuadMesh
+from torchfair.meshing import principal_quads as meshed
 from torchfair.shapes import (
     Catenoid,
     Enneper,
@@ -71,6 +73,11 @@ def layout(surface: Surface, name: str, rows: int, seed: int = 0) -> ShapeMesh:
     }[name]  # fmt: skip
     turn = math.radians(angle)
     return rotated_lattice(surface, columns_and_rows[1], columns_and_rows[0], turn, kind=kind)  # type: ignore[arg-type]
+
+
+def meshed_quads(triangles: ShapeMesh, rows: int) -> QuadMesh:
+    """About ``rows**2`` quads along the principal directions of a triangle mesh, which is all that is known."""
+    return meshed(triangles.vertices, triangles.topology, count=rows**2)
 
 
 def _sides(surface: Surface) -> tuple[float, float]:

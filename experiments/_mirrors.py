@@ -10,6 +10,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.cameras import Camera
+from torchfair.meshing import QuadMesh
 from torchfair.reflection import EquirectangularImage, SmoothReference, Stripes, render_reflection
 from torchfair.reflection.environments import Environment
 from torchfair.shapes import ShapeMesh
@@ -29,7 +30,7 @@ class Mirror(NamedTuple):
     normals: Tensor | None = None
 
 
-def plane_panels(mesh: ShapeMesh) -> Mirror:
+def plane_panels(mesh: ShapeMesh | QuadMesh) -> Mirror:
     """A mesh whose faces are plane mirrors."""
     return Mirror(mesh.vertices, mesh.topology)
 

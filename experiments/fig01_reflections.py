@@ -1,9 +1,10 @@
 """Paper Fig. 1: a reflective surface reveals the deficiencies of a mesh; principal meshes have least.
 
-A funnel of glass, part of a catenoid, in four ways with about as many vertices each: as an irregular triangle mesh, as
-a principal-symmetric triangle mesh, as a principal quad mesh, and as the smooth surface that all are inscribed in.
-Above they mirror an evening sky, below the stripes that car makers judge surfaces by. The energy E, the reflection
-score (against the smooth surface, mean over default views) and the reflection variation stand beside each.
+A funnel of glass, part of a catenoid, in five ways with about as many vertices each: as an irregular triangle mesh, as
+a principal-symmetric triangle mesh, as a principal quad mesh laid out on known curvature lines, as the quads that
+principal meshing makes of the irregular triangles alone, and as the smooth surface. Above they mirror an evening sky,
+below the stripes that car makers judge surfaces by. The energy E, the reflection score (against the smooth surface,
+mean over default views) and the reflection variation stand beside each.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import torch
 from _common import ExperimentConfig, Report, Results, run_experiment, setting
-from _layouts import ELONGATED, IRREGULAR, QUADS, layout
+from _layouts import ELONGATED, IRREGULAR, QUADS, layout, meshed_quads
 from _mirrors import Mirror, evening_sky, mirror_picture, panel_width, panels, plane_panels, smooth_mirror, striped
 
 from torchfair.energies import normal_variation
@@ -24,10 +25,10 @@ from torchfair.viewing import fit_camera
 NAME = "fig01_reflections"
 PICTURE = "reflections.png"
 SURFACE = Catenoid(1.0, (-1.3, 0.7))
-PANELS = {"triangle mesh": IRREGULAR, "principal-symmetric triangles": ELONGATED, "principal quads": QUADS}
-SMOOTH = "smooth surface"
-MESHES = {"triangle mesh": "triangles.obj", "principal-symmetric triangles": "principal_symmetric.obj",
-          "principal quads": "principal_quads.obj"}  # fmt: skip
+TRIANGLES, MESHED, SMOOTH = "triangle mesh", "principal quads, meshed", "smooth surface"
+PANELS = {TRIANGLES: IRREGULAR, "principal-symmetric triangles": ELONGATED, "principal quads": QUADS}
+MESHES = {TRIANGLES: "triangles.obj", "principal-symmetric triangles": "principal_symmetric.obj",
+          "principal quads": "principal_quads.obj", MESHED: "meshed_quads.obj"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ def experiment(config: Config, results: Results) -> Report:
     reference = SmoothReference.of_surface(SURFACE)
     setup = ReflectionSetup.for_reference(reference, size=config.size)
     meshes = {name: layout(SURFACE, kind, config.rows, config.seed) for name, kind in PANELS.items()}
+    meshes[MESHED] = made = meshed_quads(meshes[TRIANGLES], config.rows)
     report: dict[str, Report] = {}
     for name, mesh in meshes.items():
         score = reflection_score(mesh.vertices, mesh.topology, setup)
@@ -62,11 +64,11 @@ def experiment(config: Config, results: Results) -> Report:
         print(f"{name}: {row['vertices']} vertices, E {row['normal_variation']:.4g}, score {row['score']:.4f}")
     draw(config, {name: plane_panels(mesh) for name, mesh in meshes.items()} | {SMOOTH: smooth_mirror(reference)},
          report, results)  # fmt: skip
-    return {"total_absolute_curvature": SURFACE.total_absolute_curvature(), "meshes": report}
+    return {"total_absolute_curvature": SURFACE.total_absolute_curvature(), "meshes": report, "meshing": made.report}
 
 
 def draw(config: Config, mirrors: dict[str, Mirror], report: dict[str, Report], results: Results) -> None:
-    """Two rows of four pictures."""
+    """Two rows of pictures."""
     camera, pixels = fit_camera(
         mirrors[SMOOTH].vertices, towards_eye=torch.tensor([1.0, -0.35, 0.32]), up=torch.tensor([0, 0, 1.0]),
         width=panel_width(config.width, len(mirrors)), margin=0.02,

@@ -1,9 +1,10 @@
 """Paper Fig. 14: meshes with good reflections, coarse and fine.
 
 The inner, negatively curved part of a torus as an irregular triangle mesh, as a principal-symmetric triangle mesh, as a
-principal quad mesh and as the smooth surface itself, each at two levels or more. All mirror the same stripes. The paper
-says that principal-symmetric meshes and principal quads reproduce the pattern of the smooth surface faithfully. Here
-the surface is known, and the meshes are laid out on its principal curvature lines.
+principal quad mesh, as the quads that principal meshing makes of the irregular triangles alone, and as the smooth
+surface itself, each at two levels or more. All mirror the same stripes. The paper says that principal-symmetric meshes
+and principal quads reproduce the pattern of the smooth surface faithfully. Here the surface is known, and the second
+and third are laid out on its principal curvature lines.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 
 import torch
 from _common import ExperimentConfig, Report, Results, run_experiment, setting
-from _layouts import ELONGATED, IRREGULAR, QUADS, layout
+from _layouts import ELONGATED, IRREGULAR, QUADS, layout, meshed_quads
 from _mirrors import Mirror, mirror_picture, panel_width, panels, plane_panels, smooth_mirror, striped
 
 from torchfair.energies import normal_variation
@@ -25,8 +26,9 @@ from torchfair.viewing import fit_camera
 NAME = "fig14_reflections"
 PICTURE = "reflections.png"
 SURFACE = Torus(2.0, 1.0, (math.pi - 1.1, math.pi + 1.1), angles=(-1.2, 1.2))
-PANELS = {"triangle mesh": IRREGULAR, "principal-symmetric triangles": ELONGATED, "principal quads": QUADS}
-SMOOTH = "smooth surface"
+TRIANGLES, MESHED, SMOOTH = "triangle mesh", "principal quads, meshed", "smooth surface"
+PANELS = {TRIANGLES: IRREGULAR, "principal-symmetric triangles": ELONGATED, "principal quads": QUADS}
+COLUMNS = (*PANELS, MESHED)
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,9 @@ class Config(ExperimentConfig):
 def files(config: Config | None = None) -> list[str]:
     """Names of the meshes, for the given or the default levels."""
     levels = (config or Config()).rows
-    return [f"{name.replace(' ', '_').replace('-', '_')}_{rows}.obj" for rows in levels for name in PANELS]
+    return [
+        f"{name.replace(' ', '_').replace('-', '_').replace(',', '')}_{rows}.obj" for rows in levels for name in COLUMNS
+    ]
 
 
 def experiment(config: Config, results: Results) -> Report:
@@ -51,10 +55,13 @@ def experiment(config: Config, results: Results) -> Report:
     reference = SmoothReference.of_surface(SURFACE)
     setup = ReflectionSetup.for_reference(reference, size=config.size)
     names = iter(files(config))
-    report: dict[str, dict[str, Report]] = {name: {} for name in PANELS}
+    report: dict[str, dict[str, Report]] = {name: {} for name in COLUMNS}
+    meshing: Report = {}
     mirrors: list[list[Mirror]] = []
     for rows in config.rows:
         meshes = {name: layout(SURFACE, kind, rows, config.seed) for name, kind in PANELS.items()}
+        meshes[MESHED] = made = meshed_quads(meshes[TRIANGLES], rows)
+        meshing[str(rows)] = made.report
         for name, mesh in meshes.items():
             score = reflection_score(mesh.vertices, mesh.topology, setup)
             report[name][str(rows)] = {
@@ -66,10 +73,10 @@ def experiment(config: Config, results: Results) -> Report:
                 "wobble": score.wobble,
             }
             results.mesh(next(names), mesh.vertices, mesh.topology)
-        print(f"{rows}: " + ", ".join(f"{name} {float(report[name][str(rows)]['score']):.4f}" for name in PANELS))
+        print(f"{rows}: " + ", ".join(f"{name} {float(report[name][str(rows)]['score']):.4f}" for name in COLUMNS))
         mirrors.append([*map(plane_panels, meshes.values()), smooth_mirror(reference)])
     draw(config, mirrors, report, results)
-    return {"total_absolute_curvature": SURFACE.total_absolute_curvature(), "meshes": report}
+    return {"total_absolute_curvature": SURFACE.total_absolute_curvature(), "meshes": report, "meshing": meshing}
 
 
 def draw(config: Config, mirrors: list[list[Mirror]], report: dict[str, dict[str, Report]], results: Results) -> None:
@@ -86,13 +93,13 @@ def draw(config: Config, mirrors: list[list[Mirror]], report: dict[str, dict[str
         energies = ", ".join(f"{row['normal_variation']:.2f}" for row in levels.values())
         scores = ", ".join(f"{row['score']:.3f}" for row in levels.values())
         captions[name] = [f"$E$ = {energies}", f"score {scores}"]
-    sheet = panels(pictures, config.width, {name: captions[name] for name in (*PANELS, SMOOTH)})
+    sheet = panels(pictures, config.width, {name: captions[name] for name in (*COLUMNS, SMOOTH)})
     sheet.write(results.path(PICTURE), overwrite=results.force)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The experiment from the command line."""
-    return run_experiment(NAME, __doc__, Config, experiment, [PICTURE], arguments)
+    return run_experiment(NAME, __doc__, Config, experiment, [PICTURE, *files()], arguments)
 
 
 if __name__ == "__main__":

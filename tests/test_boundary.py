@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from torchfair import ShapeError, Topology
-from torchfair.boundary import boundary_corners, boundary_pieces
+from torchfair.boundary import boundary_corners, boundary_pieces, boundary_turning
 
 
 def square_grid(rows: int = 5, columns: int = 4) -> tuple[Tensor, Topology]:
@@ -57,6 +57,7 @@ def test_a_circle_of_thirty_vertices_has_no_corner_and_one_closed_piece():
     # It turns by 12 degrees everywhere.
     assert boundary_corners(vertices, topology, math.radians(11.99)).all()
     assert not boundary_corners(vertices, topology, math.radians(12.01)).any()
+    torch.testing.assert_close(boundary_turning(vertices, topology), torch.full((30,), math.pi / 15, dtype=DOUBLE))
 
 
 @pytest.mark.parametrize("turning", [0.0, 20.0, 80.0, 100.0, 135.0, 179.0])

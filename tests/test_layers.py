@@ -11,13 +11,13 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 FLOORS = (
     {"errors", "_interrupts", "_shown", "_threads"},
-    {"_half_edges", "_numbers", "cameras", "linear", "progress", "rasterisation"},
-    {"settings"},
+    {"_names", "_numbers", "_ranges", "cameras", "linear", "progress", "rasterisation"},
+    {"_half_edges", "settings"},
     {"_connectivity", "projection"},
     {"topology"},
     {"_graph"},
     {"_one_mesh", "boundary", "geometry", "polylines", "repair", "triangulation"},
-    {"_exact_triangles", "curves", "energies", "io", "normalisation", "shapes", "subdivision"},
+    {"_exact_triangles", "creases", "curves", "energies", "io", "normalisation", "shapes", "subdivision"},
     {"fields", "principal", "reflection", "self_intersections", "stars"},
     {"constraints", "measuring", "meshing", "viewing"},
     {"formfinding"},

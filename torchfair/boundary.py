@@ -49,21 +49,37 @@ def boundary_corners(vertices: Tensor, topology: Topology, corner_angle: float) 
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
         SettingsError: if ``corner_angle`` is not between 0 and pi.
     """
-    topology.check_vertices(vertices)
     if not 0 <= corner_angle <= math.pi:
         raise SettingsError(
             f"corner_angle: expected radians between 0 and pi, got {corner_angle}. Use math.radians for degrees."
         )
+    return boundary_turning(vertices, topology) > corner_angle
+
+
+def boundary_turning(vertices: Tensor, topology: Topology) -> Tensor:
+    """By how much the boundary polyline turns at its vertices; see :func:`boundary_corners`.
+
+    Args:
+        vertices: (*batch, V, 3) positions, any length unit.
+        topology: the connectivity; any polygons.
+
+    Returns:
+        (*batch, V) radians, 0 to pi; 0 at interior and isolated vertices, and where a boundary edge beside the vertex
+        has no length. No derivatives.
+
+    Raises:
+        ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+    """
+    topology.check_vertices(vertices)
     loops = topology.loop_vertices
     place = vertices.detach()[..., loops, :]
     leaving = vertices.detach()[..., loops[_following(topology)], :] - place
     arriving = torch.empty_like(leaving)
     arriving[..., _following(topology), :] = leaving
     sine = torch.linalg.vector_norm(torch.linalg.cross(arriving, leaving), dim=-1)
-    angle = torch.atan2(sine, (arriving * leaving).sum(-1))
-    corners = torch.zeros(vertices.shape[:-1], dtype=torch.bool, device=vertices.device)
-    corners[..., loops] = angle > corner_angle
-    return corners
+    turning: Tensor = sine.new_zeros(vertices.shape[:-1])
+    turning[..., loops] = torch.atan2(sine, (arriving * leaving).sum(-1))
+    return turning
 
 
 def boundary_pieces(topology: Topology, corners: Tensor) -> list[BoundaryPiece]:

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from ._exact_triangles import meet_exactly
 from ._one_mesh import one_mesh
+from ._ranges import ranges
 from .topology import Topology
 from .triangulation import triangulate
 
@@ -25,10 +26,11 @@ _MOST_PAIRS = 4_000_000  # of boxes that are looked at together
 def self_intersections(vertices: Tensor, topology: Topology) -> Tensor:
     """Pairs of faces that meet where they should not.
 
-    Faces without a common vertex meet if they have a point in common, touching included; faces with one common vertex,
-    if they meet anywhere else. Faces with a common edge are not looked at: what they can do, fold back onto each other,
-    is a dihedral angle of 180 degrees. Polygons are seen as triangles, cut as by
-    ``triangulation.triangulate``.
+    Triangles without a common vertex meet if they have a point in common, touching included; triangles with one common
+    vertex, if they meet anywhere else. Triangles with a common edge are not looked at: what they can do, fold back onto
+    each other, is a dihedral angle of 180 degrees. Polygons are cut into triangles as by
+    ``triangulation.triangulate``, and two of them meet if triangles of theirs do; the triangles of one polygon are not
+    compared.
 
     Pairs of bounding boxes come from a sweep. Triangles are told apart, or not, by their projections onto all axes that
     can separate them; where that is a matter of rounding, rational arithmetic decides. So the answer is exact for the
@@ -82,10 +84,8 @@ def _near_pairs(p: Floats) -> Iterator[Ints]:
     while start < len(p):
         before = total[start - 1] if start else 0
         stop = max(start + 1, int(np.searchsorted(total, before + _MOST_PAIRS)))
-        first = np.repeat(np.arange(start, stop), counts[start:stop])
-        own = counts[start:stop]
-        offset = np.arange(len(first)) - np.repeat(np.cumsum(own) - own, own)
-        second = first + 1 + offset
+        here, own = np.arange(start, stop), counts[start:stop]
+        first, second = np.repeat(here, own), ranges(here + 1, own)
         for other in others:
             close = (low[first, other] <= high[second, other]) & (low[second, other] <= high[first, other])
             first, second = first[close], second[close]

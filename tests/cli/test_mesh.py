@@ -15,6 +15,7 @@ from torchfair.cli.mesh import fill, options
 from torchfair.cli.parser import CommandParser
 from torchfair.io import load_edge_labels, load_mesh, save_mesh
 from torchfair.meshing import MeshingSettings, principal_quads
+from torchfair.progress import ProgressDisplay
 from torchfair.settings import fields_of
 from torchfair.shapes import Cylinder, PrincipalParaboloid, irregular_triangles
 
@@ -84,6 +85,28 @@ def test_planar_quads(tmp_path: Path) -> None:
     assert report["measures"]["distance_max"] < 0.2
     assert report["measures"]["before_planar"]["faces"] == report["measures"]["faces"]
     assert report["not_reached"] == []
+
+
+def test_ctrl_c_keeps_the_best_mesh(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """While polygons are made planar; what is not planar yet is said, once."""
+
+    def interrupt(display: ProgressDisplay, record: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ProgressDisplay, "__call__", interrupt)
+    mesh = irregular_triangles(SADDLE, 300)
+    path, output = tmp_path / "saddle.obj", tmp_path / "planar.obj"
+    save_mesh(path, mesh.vertices, mesh.topology)
+    assert main(["mesh", str(path), "-o", str(output), "--quads", "60", "--planar", "--no-pictures"]) == 130
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert load_mesh(output).topology.num_faces == report["measures"]["faces"]
+    assert len(report["not_reached"]) == 1
+    out = capsys.readouterr().out
+    assert out.splitlines()[-1] == report["not_reached"][0]
+    assert out.count("NOT REACHED") == 1
+    assert "interrupted" in out
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,6 @@ def test_what_is_missed_is_said_once_at_the_end() -> None:
     missed, kept = Promise("x", 1.0, 2.0, remedy="pull less"), Promise("y", 1.0, 0.5)
     lines = missed_lines(job(missed, kept), 0)
     assert lines == ["x 2, at most 1 asked for: NOT REACHED; pull less"]
-    assert note_lines(["a", f"level 1: {missed}", "b"], lines) == ["note: a", "note: b"]
+    assert note_lines(["c"], ["a", f"level 1: {missed}", "b"], lines) == ["repaired: c", "note: a", "note: b"]
     assert missed_lines(job(kept, levels=2), 1) == []
     assert missed_lines(job(kept, levels=2), 2) == ["1 of 2 refinements: NOT REACHED; done"]

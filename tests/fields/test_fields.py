@@ -33,7 +33,7 @@ def field(
     vertices: Tensor, topology: Topology, symmetry: Symmetry = 4, smoothing: float = 0.05
 ) -> tuple[FaceFrames, Directions, np.ndarray, np.ndarray]:
     frames = FaceFrames.of(vertices, topology)
-    directions = directions_of(vertices, topology, frames)
+    directions = directions_of(frames)
     angles = direction_field(frames, directions, smoothing, symmetry)
     return frames, directions, angles, matchings(frames, angles, symmetry)
 
@@ -74,7 +74,7 @@ def test_a_mesh_of_quads_is_refused() -> None:
 def test_directions_are_those_of_the_surface(surface: Torus | PrincipalParaboloid) -> None:
     mesh = irregular_triangles(surface, 2000)
     frames = FaceFrames.of(mesh.vertices, mesh.topology)
-    directions = directions_of(mesh.vertices, mesh.topology, frames)
+    directions = directions_of(frames)
     middle = mesh.principal_directions[:, 0][mesh.topology.triangles[:, 0]].numpy()
     exact = np.arctan2((middle * frames.second).sum(1), (middle * frames.first).sum(1))
     off = np.angle(directions.values * np.exp(-2j * exact)) / 2  # not up to quarter turns: the larger curvature
@@ -90,27 +90,36 @@ def test_there_is_no_confidence_on_spheres_and_planes() -> None:
     flat = flat * torch.tensor([1.0, 1, 0])
     for vertices, connectivity in ((sphere.vertices, sphere.topology), (flat, topology)):
         frames = FaceFrames.of(vertices, connectivity)
-        assert directions_of(vertices, connectivity, frames).confidence.max() < 0.1
+        assert directions_of(frames).confidence.max() < 0.1
     vertices, connectivity = irregular(SADDLE)
     frames = FaceFrames.of(vertices, connectivity)
-    found = directions_of(vertices, connectivity, frames).confidence
+    found = directions_of(frames).confidence
     assert 0.5 < np.median(found) <= found.max() <= 1.5
 
 
-def test_directions_of_finer_triangles_are_the_same_in_space() -> None:
+def test_directions_of_finer_triangles_are_linear_in_those_that_they_lie_in() -> None:
     vertices, topology = irregular(SADDLE, 200)
     frames = FaceFrames.of(vertices, topology)
-    directions = directions_of(vertices, topology, frames)
+    directions = directions_of(frames)
     finer = midpoint(topology)
     fine = FaceFrames.of(finer.apply(vertices), finer.topology)
-    carried = carried_directions(directions, frames, fine, finer.face_parents.numpy())
+    parents = finer.face_parents.numpy()
+    carried = carried_directions(directions, frames, fine, parents)
 
-    def in_space(of: Directions, frame: FaceFrames) -> np.ndarray:
-        angle = np.angle(of.values)[:, None] / 2
-        axis = np.cos(angle) * frame.first + np.sin(angle) * frame.second
-        return axis[:, :, None] * axis[:, None]  # without sign
+    def in_space(values: np.ndarray, frame: FaceFrames) -> np.ndarray:
+        plane = np.stack([values.real, values.imag, values.imag, -values.real], -1).reshape(*values.shape, 2, 2)
+        axes = np.stack([frame.first, frame.second], 1).reshape(-1, *[1] * (values.ndim - 1), 2, 3)
+        return np.swapaxes(axes, -1, -2) @ plane @ axes
 
-    assert np.allclose(in_space(carried, fine), in_space(directions, frames)[finer.face_parents.numpy()], atol=1e-9)
+    found, given = in_space(carried.at_corners, fine), in_space(directions.at_corners, frames)
+    for child, parent in enumerate(parents[:40]):  # at an old vertex that of its corner, at a new one a mean of two
+        middles = (given[parent] + np.roll(given[parent], -1, axis=0)) / 2
+        expected = np.concatenate([given[parent], middles]).reshape(6, -1)
+        corners = frames.points[frames.triangles[parent]]
+        places = np.concatenate([corners, (corners + np.roll(corners, -1, axis=0)) / 2])
+        at = ((fine.points[fine.triangles[child]][:, None] - places) ** 2).sum(-1).argmin(1)
+        assert np.allclose(found[child].reshape(3, -1), expected[at], atol=1e-12)
+    assert np.allclose(in_space(carried.values, fine)[parents == 7].mean(0), in_space(directions.values, frames)[7])
 
 
 @pytest.mark.parametrize("symmetry", [2, 4])
@@ -186,7 +195,7 @@ def test_singular_vertices_of_a_monkey_saddle_are_merged() -> None:
 
 def test_opposite_singular_vertices_cancel() -> None:
     frames = FaceFrames.of(*irregular(SADDLE))
-    directions = directions_of(*irregular(SADDLE), frames)
+    directions = directions_of(frames)
     angles = direction_field(frames, directions, 0.05, 4)
     matched = matchings(frames, angles)
     inner = np.flatnonzero(~frames.is_boundary[frames.edges].any(1))

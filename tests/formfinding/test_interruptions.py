@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import pytest
@@ -60,16 +60,21 @@ def quads(n: int = 5) -> tuple[Tensor, Topology]:
     return vertices, Topology.from_faces(grid_faces(n, n))
 
 
+def mostly_slow(phases: Iterable[str], *quick: str) -> list[object]:
+    """Phases as parameters: all but the quick ones are marked slow."""
+    return [pytest.param(phase, marks=() if phase in quick else pytest.mark.slow) for phase in phases]
+
+
 FAIR = replace(FairSettings(), planar="none", projection=replace(FairSettings().projection, max_iterations=3))
 FAIR_PHASES = {
     "start": ("job.recipe:one_start", 1, 0),
     "measuring the start": ("fair.recipe:fair_measures", 1, 0),
-    "problem": ("fair.problem:boundary_corners", 1, 0),
+    "problem": ("fair.feature_curves:boundary_corners", 1, 0),
     "plan": ("fair.problem:FairProblem.shares", 1, 0),
     "first terms": ("fair.problem:FairProblem.terms", 1, 0),
-    "first compiled": ("job.session:GuidedProjection", 1, 0),
+    "first compiled": ("job.compiled_problems:GuidedProjection", 1, 0),
     "second terms": ("fair.problem:FairProblem.terms", 2, 1),
-    "third compiled": ("job.session:GuidedProjection.with_terms", 2, 2),
+    "third compiled": ("job.compiled_problems:GuidedProjection.with_terms", 2, 2),
     "blocks in between": ("fair.problem:FairProblem.blocks", 2, 1),
     "measuring the result": ("fair.recipe:fair_measures", 2, 3),
 }
@@ -130,15 +135,15 @@ FORM_PHASES = {  # function, call, stages of the coarse level that are done (-1:
     "problem": ("form.recipe:FormProblem", 1, 0, False),
     "directions": ("form.problem:FormProblem.directions", 1, 0, False),
     "first terms": ("form.problem:FormProblem.height_terms", 1, 0, False),
-    "first compiled": ("job.session:GuidedProjection", 1, 0, False),
+    "first compiled": ("job.compiled_problems:GuidedProjection", 1, 0, False),
     "doubt": ("form.plan:FormPlan._is_doubtful", 1, 1, False),
-    "second compiled": ("job.session:GuidedProjection", 2, 1, False),
-    "third compiled": ("job.session:GuidedProjection.with_terms", 1, 2, False),
+    "second compiled": ("job.compiled_problems:GuidedProjection", 2, 1, False),
+    "third compiled": ("job.compiled_problems:GuidedProjection.with_terms", 1, 2, False),
     "measuring the level": ("form.recipe:form_measures", 2, -1, False),
     "refinement": ("form.recipe:loop", 1, -1, False),
     "finer problem": ("form.recipe:FormProblem", 2, -1, False),
     "measuring the finer start": ("form.recipe:form_measures", 3, -1, False),
-    "finer compiled": ("job.session:GuidedProjection", 3, -1, False),
+    "finer compiled": ("job.compiled_problems:GuidedProjection", 3, -1, False),
     "measuring the result": ("form.recipe:form_measures", 4, -1, True),
 }
 
@@ -150,7 +155,7 @@ def surfaces() -> list[JobResult[Level]]:
 
 
 @WAYS
-@pytest.mark.parametrize("phase", FORM_PHASES)
+@pytest.mark.parametrize("phase", mostly_slow(FORM_PHASES, "start", "finer compiled", "measuring the level"))
 def test_lowering_c_keeps_the_stages_and_levels_done(
     phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, surfaces: list[JobResult[Level]]
 ) -> None:
@@ -272,8 +277,8 @@ SYMMETRIC_PHASES = {
     "measuring the start": ("symmetric.recipe:symmetric_measures", 1, 0),
     "snapshot": ("symmetric.problem:SymmetricProblem.snapshot", 1, 0),
     "first decision": ("symmetric.plan:SymmetricPlan._decide", 1, 0),
-    "first compiled": ("job.session:GuidedProjection", 1, 0),
-    "second compiled": ("job.session:GuidedProjection", 2, 1),
+    "first compiled": ("job.compiled_problems:GuidedProjection", 1, 0),
+    "second compiled": ("job.compiled_problems:GuidedProjection", 2, 1),
     "second decision": ("symmetric.plan:SymmetricPlan._decide", 2, 1),
     "score": ("symmetric.plan:SymmetricPlan._score", 1, 1),
     "measuring the result": ("symmetric.recipe:symmetric_measures", 2, 1),
@@ -294,7 +299,9 @@ def whole() -> JobResult[SymmetricLevel]:
 
 
 @WAYS
-@pytest.mark.parametrize("phase", SYMMETRIC_PHASES)
+@pytest.mark.parametrize(
+    "phase", mostly_slow(SYMMETRIC_PHASES, "first compiled", "finer problem", "measuring the result")
+)
 def test_a_design_keeps_the_levels_done(
     phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, whole: JobResult[SymmetricLevel]
 ) -> None:

@@ -11,7 +11,7 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.curves import ClosedCurve
 from torchfair.errors import MeshError
-from torchfair.formfinding import start_surface
+from torchfair.formfinding import FormRecipe, start_surface
 from torchfair.geometry import corner_angles, dihedral_angles, face_area_vectors, face_areas
 from torchfair.self_intersections import self_intersections
 
@@ -149,3 +149,19 @@ def test_curves_that_no_surface_is_found_between_are_named() -> None:
     chain = [circle(1.0, 0.0), circle(0.2, 0.0, 3.0), circle(0.2, 0.5, 0.0), circle(0.2, -0.5, 0.0)]
     with pytest.raises(MeshError, match="between these 4 curves"):
         start_surface(chain, 300)
+
+
+def test_a_start_that_has_to_run_through_itself_says_so() -> None:
+    """No disk without self-intersections is bounded by a knot."""
+
+    def trefoil(t: Tensor) -> Tensor:
+        a = math.tau * t
+        radius = 2.0 + (3.0 * a).cos()
+        return torch.stack([radius * (2.0 * a).cos(), radius * (2.0 * a).sin(), (3.0 * a).sin()], 1)
+
+    recipe = FormRecipe(*start_surface([ClosedCurve.from_function(trefoil)], 90))
+    assert recipe.before()["self_intersections"] > 0
+    assert [note for note in recipe.notes if "runs through itself" in note]
+    disk = FormRecipe(*start_surface([circle(1.0, 0.0)], 61))
+    disk.before()
+    assert not disk.notes

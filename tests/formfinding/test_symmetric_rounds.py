@@ -7,7 +7,7 @@ import torch
 from helpers import DOUBLE
 
 from torchfair.formfinding import Session, SymmetricRecipe, SymmetricSettings
-from torchfair.formfinding.job import session as module
+from torchfair.formfinding.job import compiled_problems as module
 from torchfair.formfinding.job.plan import Stages
 from torchfair.formfinding.symmetric.plan import SymmetricPlan
 from torchfair.formfinding.symmetric.problem import Aim

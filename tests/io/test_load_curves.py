@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from torchfair.curves import ClosedCurve
 from torchfair.errors import MeshFileError
 from torchfair.io import load_curve, load_curves
 
@@ -137,3 +138,31 @@ def test_curves_of_3dm_files(tmp_path: Path) -> None:
     assert same_loop(square.points, SQUARE)
     radii = (circle.points - torch.tensor([5.0, 0.0, 0.0], dtype=torch.float64)).norm(dim=1)
     assert float((radii - 2.0).abs().max()) < 1e-6
+
+
+def test_3dm_files_are_read_in_double_precision_with_corners_between_segments(tmp_path: Path) -> None:
+    rhino = pytest.importorskip("rhino3dm")
+    third = 1.0 / 3.0
+    exact = [(third, 0.1, -1e-9), (1.0, 0.1, 0.7), (1.0, 1.0 + 2.0**-50, 0.0), (1e6 + third, 2.0, 3.0)]
+    model = rhino.File3dm()
+    line = rhino.Polyline(0)
+    for x, y, z in [*exact, exact[0]]:
+        line.Add(x, y, z)
+    model.Objects.AddPolyline(line)
+    model.Write(str(tmp_path / "x.3dm"), 7)
+    (curve,) = load_curves(tmp_path / "x.3dm")
+    assert curve.points.tolist() == [list(row) for row in exact]
+
+    half_disk = rhino.PolyCurve()  # a line and a half circle, joined in Rhino
+    left, top, right = (rhino.Point3d(*row) for row in [(-third, 0.0, 0.0), (0.0, third, 0.0), (third, 0.0, 0.0)])
+    half_disk.Append(rhino.Line(left, right))
+    half_disk.Append(rhino.Arc(right, top, left))
+    model = rhino.File3dm()
+    model.Objects.AddCurve(half_disk)
+    model.Write(str(tmp_path / "y.3dm"), 7)
+    (curve,) = load_curves(tmp_path / "y.3dm")
+    rim = ClosedCurve(curve.points)
+    corners = rim.at(rim.corners)
+    assert sorted(corners[:, 0].tolist()) == pytest.approx([-third, third], abs=1e-12)
+    assert float(corners[:, 1:].abs().max()) < 1e-12
+    assert rim.length == pytest.approx(third * (2.0 + math.pi), rel=1e-4)

@@ -11,6 +11,8 @@ from torchfair.meshing.boundary_cells import compact, tidy_boundary
 from torchfair.meshing.polygon_edits import PolygonEdits
 from torchfair.meshing.tracing import Cells
 
+NO_CREASES = np.zeros((0, 2), np.int64)
+
 
 def grid(rows: int = 4, columns: int = 4) -> tuple[np.ndarray, list[list[int]], np.ndarray]:
     """Positions, quads, and which vertices are on the boundary."""
@@ -35,7 +37,7 @@ def is_disk(of: PolygonEdits) -> bool:
 
 def test_a_collapse_ends_on_the_boundary() -> None:
     found = edits()
-    assert found.collapse((5, 1), inner=True)
+    assert found.collapse((5, 1))
     assert 5 not in found.around
     assert found.positions[1].tolist() == [0, 1, 0]
     assert is_disk(found)
@@ -46,8 +48,8 @@ def test_a_collapse_ends_on_the_boundary() -> None:
 
 def test_fixed_nodes_stay() -> None:
     found = edits(fixed=(5, 9))
-    assert not found.collapse((5, 9), inner=True)
-    assert found.collapse((5, 6), inner=True)
+    assert not found.collapse((5, 9))
+    assert found.collapse((5, 6))
     assert 5 in found.around
     assert 6 not in found.around
 
@@ -56,24 +58,24 @@ def test_a_surface_is_not_pinched() -> None:
     """An inner edge between two boundary nodes: its collapse would leave two parts that touch in a point."""
     found = edits(3, 2)
     before = {number: list(face) for number, face in found.faces.items()}
-    assert not found.collapse((2, 3), inner=True)
+    assert not found.collapse((2, 3))
     assert found.faces == before
-    assert found.collapse((0, 1), inner=False)
+    assert found.collapse((0, 1))
     assert is_disk(found)
 
 
 def test_the_last_face_does_not_vanish() -> None:
     found = PolygonEdits(np.eye(3), [[0, 1, 2]], np.ones(3, bool), np.zeros(3, bool))
-    assert not found.collapse((0, 1), inner=False)
+    assert not found.collapse((0, 1))
     assert found.faces == {0: [0, 1, 2]}
 
 
 def test_faces_are_not_turned_over() -> None:
     found = edits()
     found.positions[5] = [2.5, 0.4, 0]  # folded beforehand: collapsing another edge must not count that as its side
-    found = PolygonEdits(found.positions, list(found.faces.values()), found.on_boundary, found.fixed)
+    found = PolygonEdits(found.positions, list(found.faces.values()), found.on_curve, found.fixed)
     start = {number: found.area(number) for number in found.faces}
-    found.collapse((6, 10), inner=True)
+    found.collapse((6, 10))
     assert all(found.area(number) > 0 or start[number] <= 0 for number in found.faces)
 
 
@@ -92,25 +94,33 @@ def test_merging() -> None:
     assert is_disk(found)
 
 
-def test_slivers_and_short_edges_go() -> None:
+@pytest.mark.parametrize("far", [0.0, 1e6])
+def test_slivers_and_short_edges_go(far: float) -> None:
     """A row of quads a hundredth as high as the others along the boundary."""
     positions, faces, outer = grid(5, 6)
     positions[positions[:, 1] == 5, 1] = 4.01
+    positions = 0.01 * positions + far
     corner = np.isin(np.arange(len(positions)), [0, 24, 5, 29])
     on = [[0, 1, 0, 1] for _ in faces]
-    cells = Cells(positions, faces, on, outer, np.zeros(len(positions), bool), corner)
-    tidied, left, _ = compact(tidy_boundary(cells, 1.0, 1.0))
+    cells = Cells(positions, faces, on, outer, corner, NO_CREASES)
+    tidied, left, *_ = compact(tidy_boundary(cells, 0.01, 1e-4))
     topology = Topology.from_faces(left, len(tidied))
     assert topology.num_vertices - topology.num_edges + topology.num_faces == 1
     assert topology.num_faces == 16
     assert topology.is_quadrangular
-    assert tidied[:, 1].max() == 4.01
+    assert tidied[:, 1].max() == positions[:, 1].max()
     ends = tidied[topology.edges.numpy()]
-    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min() > 0.3
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min() > 0.003
+
+
+def test_areas_do_not_depend_on_the_place() -> None:
+    positions, faces, outer = grid()
+    far = PolygonEdits(0.01 * positions + 1e6, faces, outer, np.zeros(len(positions), bool))
+    assert [far.area(number) for number in far.faces] == pytest.approx([1e-4] * len(faces), rel=1e-6)
 
 
 def test_bulges_over_one_line_are_dropped() -> None:
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     outer, corner = np.ones(4, bool), np.zeros(4, bool)
-    cells = Cells(positions, [[0, 1, 2, 3], [1, 0]], [[0, 1, 0, 1], [2, 0]], outer, corner, ~corner)
+    cells = Cells(positions, [[0, 1, 2, 3], [1, 0]], [[0, 1, 0, 1], [2, 0]], outer, ~corner, NO_CREASES)
     assert compact(tidy_boundary(cells, 1.0, 1.0)).faces == [[0, 1, 2, 3]]

@@ -56,6 +56,7 @@ def test_bad_saddles_of_fig_4bc(heights: tuple[float, ...], pattern: tuple[int, 
     classes = classify_stars(*hexagonal(*heights))
     assert classes.kinds[0] == SADDLE
     assert not bool(classes.good[0])
+    assert classes.bad_saddles.nonzero().tolist() == classes.bad.nonzero().tolist() == [[0]]
     assert classes.pattern(0) == classes.pattern(0, ordinary=True) == pattern
     sides = classes.sides[: len(heights)]
     not_met = sides == sides.roll(-1)

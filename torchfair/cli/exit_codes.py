@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..projection import Status
+
 EXIT_OK = 0
 EXIT_NOT_REACHED = 1
 EXIT_ERROR = 2
@@ -13,3 +19,17 @@ IN_WORDS = (
     "written, the last line says what); 2 wrong usage, unreadable input, existing output or unsuitable mesh (one line "
     "on stderr says what); 130 interrupted (the best found until then is written, if there is any)"
 )
+
+
+def exit_code(status: Status | None, missed: Sequence[str], *, interrupted: bool = False) -> int:
+    """That of a job that ended with a status, if it solved anything, and missed some promises.
+
+    ``interrupted`` says whether what came after the solve was.
+    """
+    if status is not None:
+        from ..projection import Status
+
+        interrupted = interrupted or status is Status.INTERRUPTED
+    if interrupted:
+        return EXIT_INTERRUPTED
+    return EXIT_NOT_REACHED if missed else EXIT_OK

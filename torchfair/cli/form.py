@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from .arguments import positive_count
 from .form_inputs import read_form_input
+from .form_mesh import FormOutputs, add_mesh
 from .inputs import add_handles, add_levels, add_repair, read_handles
 from .job_command import JobCommand
 from .outputs import Request, Writer
@@ -62,14 +63,21 @@ class FormCommand(JobCommand):
             "curve for a disk, two for an annulus, more for more holes; repeatable")  # fmt: skip
         add("--close", action="store_true", help="close open arcs by straight lines")
         add("--starts", type=positive_count, metavar="N", help="try so many surfaces to start from, and go on with the "
-            "best (default 6 from curves alone, 1 from a mesh)")  # fmt: skip
+            f"best (default {_STARTS} from curves alone, 1 from a mesh)")  # fmt: skip
+        add("--remesh", action="store_true", help="replace the triangles where they become thin or fold, and go on: "
+            "vertices have other numbers then; always done without a mesh to start from")  # fmt: skip
         add("--vertices", type=positive_count, default=1000, metavar="N", help="size of a start made from curves "
             "(default 1000)")  # fmt: skip
         add("--through", nargs=3, action="append", default=[], type=float, metavar=("X", "Y", "Z"),
             help="a point to pass through: pulls the nearest inner vertex of the start; repeatable")  # fmt: skip
         add_levels(parser)
+        add_mesh(parser)
         add_handles(parser)
         add_repair(parser)
+
+    def outputs(self, arguments: argparse.Namespace) -> FormOutputs:
+        """See the base class."""
+        return FormOutputs(arguments, self.pictures)
 
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""
@@ -77,8 +85,9 @@ class FormCommand(JobCommand):
         options = {
             "curves": start.curves or None,
             "normals": start.normals,
-            "handles": read_handles(arguments) | start.nearest(arguments.through),
+            "handles": read_handles(arguments, start.mesh) | start.nearest(arguments.through),
             "levels": arguments.levels,
+            "remesh": arguments.remesh or arguments.input is None,
             "starts": arguments.starts or (_STARTS if arguments.input is None else 1),
         }
         return Request(start.mesh, options, notes=start.notes)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from .exit_codes import EXIT_INTERRUPTED, EXIT_NOT_REACHED, EXIT_OK, IN_WORDS
+from .exit_codes import IN_WORDS, exit_code
 from .options import SettingOptions
-from .outputs import Outputs, Request, Writer
+from .outputs import Outputs, Request, Writer, add_outputs, asked_for
 from .parser import CommandParser
+from .reading import in_numbers_of
 from .summary import kept_lines, measures_table, missed_lines, note_lines, work_lines
 
 if TYPE_CHECKING:
@@ -82,11 +83,7 @@ class JobCommand(ABC):
 
     def _fill(self, parser: CommandParser) -> None:
         self.add_inputs(parser)
-        add = parser.add_argument
-        add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
-        add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
-        add("--no-pictures", action="store_true", help="write no pictures")
-        add("--force", action="store_true", help="replace files that exist")
+        add_outputs(parser)
         self.options().add_to(parser)
 
     def options(self) -> SettingOptions[Any]:
@@ -103,20 +100,20 @@ class JobCommand(ABC):
         outputs.make_folders()
         for warning in request.warnings:
             print(f"{self.name}: warning: {warning}", file=sys.stderr, flush=True)
-        result = self._solve(request, settings)
+        mesh = request.mesh
+        with in_numbers_of(mesh):
+            result = self._solve(request, settings)
         outputs.write_mesh(request, result)
-        missed = missed_lines(result, getattr(arguments, "levels", 0))
+        missed = [*missed_lines(result, getattr(arguments, "levels", 0)), *request.missed]
         lines = [
-            *(f"repaired: {sentence}" for sentence in request.mesh.repairs),
-            *note_lines([*request.notes, *result.notes], missed),
+            *note_lines(mesh.repairs, [*mesh.notes, *request.notes, *result.notes], missed),
             *measures_table(result.before, result.after),
             *kept_lines(result),
             *work_lines(result),
+            *outputs.lines(),
         ]
-        print("\n".join(lines), flush=True)
-        outputs.write_others(self._report(arguments, request, result, settings), request, result)
-        print("\n".join([*(f"wrote {path}" for path in outputs.paths()), *missed]))
-        return self._exit_code(result, missed)
+        outputs.finish(request, result, lines, self._report(arguments, request, result, settings), missed)
+        return exit_code(result.projection.status, missed, interrupted=request.interrupted)
 
     def _solve(self, request: Request, settings: Any) -> JobResult[Any]:
         from ..progress import ProgressDisplay
@@ -130,16 +127,7 @@ class JobCommand(ABC):
     ) -> dict[str, Any]:
         from ..formfinding import job_report
 
-        asked = {name: value for name, value in vars(arguments).items() if name not in _NOT_ASKED and "." not in name}
-        own = {"job": self.job, "request": asked, **request.report}
+        mesh = request.mesh
+        read = {"repairs": mesh.repairs, "input_notes": mesh.notes, "vertex_map": mesh.vertex_map}
+        own = {"job": self.job, "request": asked_for(arguments), **read, **request.report}
         return {**own, **job_report(result, settings)}
-
-    def _exit_code(self, result: JobResult[Any], missed: Sequence[str]) -> int:
-        from ..projection import Status
-
-        if result.projection.status is Status.INTERRUPTED:
-            return EXIT_INTERRUPTED
-        return EXIT_NOT_REACHED if missed else EXIT_OK
-
-
-_NOT_ASKED = ("run", "name", "version")

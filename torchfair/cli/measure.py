@@ -10,6 +10,7 @@ from ..io.json_text import to_json
 from .arguments import count
 from .errors import CommandError
 from .inputs import add_reference, add_repair, read_input, read_reference
+from .reading import said_of
 
 if TYPE_CHECKING:
     from ..measuring import EdgeMeasures, Quantity
@@ -84,23 +85,27 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Reads, measures, prints."""
     from ..geometry import ReferenceSurface
-    from ..measuring import curvature_doubts, fold_measures, measure_mesh, measure_stationarity, worst_edges
+    from ..measuring import curvature_doubts, measure_mesh, measure_stationarity, worst_edges
+    from ..self_intersections import self_intersections
 
     if arguments.per_vertex and not (arguments.json and arguments.reference):
         raise CommandError("--per-vertex gives lists with --json and --reference only", NAME)
-    mesh, reference = read_input(arguments.input, arguments.repair), read_reference(arguments)
+    mesh, reference = read_input(arguments.input, arguments), read_reference(arguments)
     quantities = measure_mesh(mesh.vertices, mesh.topology)
     lists = {}
     if reference is not None:
         stationarity = measure_stationarity(mesh.vertices, mesh.topology, ReferenceSurface(*reference))
         quantities += stationarity.quantities()
         lists = {"per_vertex": stationarity.per_vertex()} if arguments.per_vertex else {}
-    doubts = curvature_doubts(fold_measures(mesh.vertices.double(), mesh.topology))
+    measures = {quantity.key: quantity.value or 0.0 for quantity in quantities}
+    meetings = len(self_intersections(mesh.vertices, mesh.topology))
+    doubts = curvature_doubts({**measures, "self_intersections": meetings})
     worst = worst_edges(mesh.vertices, mesh.topology, arguments.worst)
     if arguments.json:
         entries = {
             "file": arguments.input,
             "repairs": list(mesh.repairs),
+            "notes": list(mesh.notes),
             "units": {quantity.key: _unit(quantity) for quantity in quantities},
             "worst_edges": worst,
             **lists,
@@ -108,8 +113,8 @@ def run(arguments: argparse.Namespace) -> int:
         }
         sys.stdout.write(to_json({**{quantity.key: quantity.value for quantity in quantities}, **entries}))
     else:
-        for sentence in mesh.repairs:
-            print(f"repaired: {sentence}")
+        for line in said_of(mesh):
+            print(line)
         print(f"{arguments.input}\n{format_quantities(quantities)}")
         for doubt in doubts:
             print(f"\nC is not to be trusted: {doubt}")

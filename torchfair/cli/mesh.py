@@ -11,14 +11,17 @@ from typing import TYPE_CHECKING, Any
 from .arguments import positive_count
 from .edge_marks import file_of_marks
 from .errors import CommandError
-from .exit_codes import EXIT_NOT_REACHED, EXIT_OK, IN_WORDS
+from .exit_codes import IN_WORDS, exit_code
 from .inputs import add_repair, read_input
 from .mesh_planar import made_planar
 from .options import SettingOptions
-from .outputs import Outputs, Request, Writer
+from .outputs import Outputs, Request, Writer, add_outputs, asked_for
 from .parser import CommandParser
+from .reading import in_numbers_of
+from .summary import note_lines
 
 if TYPE_CHECKING:
+    from ..io import PolygonMesh
     from ..meshing import MeshingSettings, QuadMesh, TriangleMesh
 
     Made = QuadMesh | TriangleMesh
@@ -27,7 +30,7 @@ NAME = "torchfair mesh"
 _DESCRIPTION = (
     "Makes a mesh of a surface whose edges follow its principal curvature lines: quads, which are then nearly planar "
     "and have the least E of all, or a half-shifted lattice of triangles, from which 'torchfair symmetric' starts. "
-    "Vertices lie on the surface; corners of the boundary stay, and parts of it that follow a direction become lines "
+    "Vertices lie on a smooth surface through those given; corners of the boundary stay, and parts of it that follow a direction become lines "
     "of the mesh. The topology is that of the surface, or nothing is written."
 )
 _ROWS = {
@@ -41,6 +44,9 @@ _ROWS = {
     "total_absolute_curvature": "C of the surface",
     "variation_over_curvature": "E/C",
     "distance_max": "largest distance from the surface, in mean edges",
+    "spacing_shortest": "shortest spacing asked for",
+    "spacing_longest": "longest ...",
+    "range_share": "share of the surface at the ends of the range",
 }
 
 
@@ -66,10 +72,7 @@ def fill(parser: CommandParser) -> None:
     add("--triangles", type=positive_count, metavar="N", help="about so many triangles, with principal edges")
     add("--planar", action="store_true", help="move vertices near the surface until all polygons are planar, as "
         "'torchfair fair --planar quads' does")  # fmt: skip
-    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
-    add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
-    add("--no-pictures", action="store_true", help="write no pictures")
-    add("--force", action="store_true", help="replace files that exist")
+    add_outputs(parser)
     options().add_to(parser)
 
 
@@ -87,28 +90,32 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.planar and arguments.triangles:
         raise CommandError("--planar is for --quads: triangles are planar")
     settings = options().settings(arguments)
-    outputs = MeshOutputs(arguments, {"mesh.png": _singular, "edges.png": _edges})
+    outputs = MeshOutputs(arguments, {"mesh.png": draw_singular, "edges.png": _edges})
     outputs.prepare()
-    surface = read_input(arguments.input, arguments.repair)
+    surface = read_input(arguments.input, arguments)
     outputs.make_folders()
     began = time.perf_counter()
-    made, missed = _made(surface.vertices, surface.topology, arguments, settings)
+    with in_numbers_of(surface):
+        made = _made(surface, arguments, settings)
+    missed: list[str] = []
+    status = None
+    if arguments.planar:
+        made, missed, status = made_planar(made, surface)
     request = Request(surface, {})
     outputs.write_mesh(request, made)
-    lines = [*(f"repaired: {sentence}" for sentence in surface.repairs), *(f"note: {note}" for note in made.notes)]
-    print("\n".join([*lines, *_table(made.report)]), flush=True)
-    outputs.write_others(_report(arguments, made, settings, missed, time.perf_counter() - began), request, made)
-    print("\n".join([*(f"wrote {path}" for path in outputs.paths()), *missed]))
-    return EXIT_NOT_REACHED if missed else EXIT_OK
+    notes = [*surface.notes, *made.notes, *request.notes]
+    lines = [*note_lines(surface.repairs, notes, missed), *table(made.report)]
+    report = _report(arguments, made, settings, missed, time.perf_counter() - began)
+    outputs.finish(request, made, lines, report, missed)
+    return exit_code(status, missed)
 
 
-def _made(vertices: Any, topology: Any, arguments: argparse.Namespace, settings: Any) -> tuple[Made, list[str]]:
+def _made(surface: PolygonMesh, arguments: argparse.Namespace, settings: MeshingSettings) -> Any:
     from ..meshing import principal_quads, principal_triangles
 
     if arguments.triangles:
-        return principal_triangles(vertices, topology, count=arguments.triangles, settings=settings), []
-    quads = principal_quads(vertices, topology, count=arguments.quads, settings=settings)
-    return made_planar(quads, (vertices, topology)) if arguments.planar else (quads, [])
+        return principal_triangles(surface.vertices, surface.topology, count=arguments.triangles, settings=settings)
+    return principal_quads(surface.vertices, surface.topology, count=arguments.quads, settings=settings)
 
 
 class MeshOutputs(Outputs):
@@ -131,7 +138,8 @@ def _labels(path: Path, request: Request, result: Any, overwrite: bool) -> None:
     save_edge_labels(path, result.topology, result.principal.mask, overwrite=overwrite)
 
 
-def _singular(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+def draw_singular(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+    """Writes the picture of a principal mesh."""
     from ..viewing import picture_principal_edges, picture_principal_mesh
 
     if hasattr(result, "principal"):
@@ -148,9 +156,10 @@ def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
     picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
 
 
-def _table(report: Mapping[str, Any]) -> list[str]:
+def table(report: Mapping[str, Any]) -> list[str]:
+    """What was measured on a principal mesh, one line for each."""
     width = max(map(len, _ROWS.values()))
-    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items()]
+    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items() if name in report]
     found = ", ".join(f"{count} of index {index}" for index, count in report["singular"].items())
     return [*lines, f"{'singular points':<{width}}  {found or 'none':>10}"]
 
@@ -164,10 +173,9 @@ def _report(
 ) -> dict[str, Any]:
     from ..settings import plain_settings
 
-    names = ("input", "quads", "triangles", "planar", "output")
     return {
         "job": "mesh",
-        "request": {name: getattr(arguments, name) for name in names},
+        "request": asked_for(arguments),
         "settings": plain_settings(settings),
         "measures": made.report,
         "singular_points": made.singular_points,

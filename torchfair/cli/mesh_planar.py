@@ -2,34 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+from .._interrupts import deferred_interrupts
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
+    from ..io import PolygonMesh
     from ..meshing import QuadMesh
-    from ..topology import Topology
-
-_DISTANCE = 0.03  # mean edges from the surface
+    from ..projection import Status
 
 
-def made_planar(mesh: QuadMesh, surface: tuple[Tensor, Topology]) -> tuple[QuadMesh, list[str]]:
-    """The mesh with planar polygons near the surface, and what was not reached.
+class PlanarMesh(NamedTuple):
+    """What became of a mesh that was to be made planar.
 
-    Its report is that of the mesh before, under ``before_planar``, and that of the result.
+    Attributes:
+        mesh: with the report of the mesh before, under ``before_planar``, beside its own.
+        missed: what was not reached, in words.
+        status: how the solve ended.
     """
-    from ..formfinding import FairSettings, minimise_normal_variation
-    from ..progress import ProgressDisplay
 
-    settings = FairSettings(planar="quads", distance_limit=_DISTANCE, directions="keep")
-    with ProgressDisplay(settings.projection.max_iterations) as display:
-        result = minimise_normal_variation(
-            mesh.vertices, mesh.topology, reference=surface, settings=settings, callback=display
-        )
-    from ..meshing import measure_mesh_on
+    mesh: QuadMesh
+    missed: list[str]
+    status: Status
 
-    report = {**measure_mesh_on(result.vertices, mesh, surface), "before_planar": mesh.report}
-    missed = [str(promise) for promise in result.promises if not promise.holds]
-    notes = [*mesh.notes, *result.notes]
-    return replace(mesh, vertices=result.vertices, report=report, notes=notes), missed
+
+def made_planar(mesh: QuadMesh, surface: PolygonMesh) -> PlanarMesh:
+    """The mesh with planar polygons near the surface. Ctrl-C ends the solve, not the command: the best mesh is kept."""
+    with deferred_interrupts():
+        from ..formfinding import PLANAR_QUADS, planar_quads
+        from ..progress import ProgressDisplay
+
+        with ProgressDisplay(PLANAR_QUADS.projection.max_iterations) as display:
+            made, job = planar_quads(mesh, (surface.vertices, surface.topology), callback=display)
+    missed = [str(promise) for promise in job.promises if not promise.holds]
+    return PlanarMesh(made, missed, job.projection.status)

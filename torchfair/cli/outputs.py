@@ -14,8 +14,12 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from ..io import PolygonMesh
+    from ..topology import Topology
 
-_MESH_FORMATS = (".obj", ".off", ".ply")
+_NOT_ASKED = ("run", "name", "version")
+_MESH_FORMATS = (".obj", ".off", ".ply", ".stl", ".glb", ".3dm")
+_WITH_ATTRIBUTES = (".obj", ".3dm")
+_TRIANGLES = (".stl", ".glb")
 
 
 @dataclass
@@ -31,6 +35,8 @@ class Request:
         marks: Marked edges (E,) of the mesh, which go with it; None for none.
         settings: To solve with; by default those that options ask for.
         report: Entries of ``report.json`` beside those that all jobs have.
+        missed: What was asked for beside the job and is not there, in words.
+        interrupted: Whether what comes after the job was interrupted.
     """
 
     mesh: PolygonMesh
@@ -41,6 +47,8 @@ class Request:
     settings: Any = None
     marks: Tensor | None = None
     report: dict[str, Any] = field(default_factory=dict)
+    missed: list[str] = field(default_factory=list)
+    interrupted: bool = False
 
 
 Writer = Callable[[Path, Any, Any, bool], object]
@@ -86,15 +94,20 @@ class Outputs:
 
     def write_mesh(self, request: Request, result: Any) -> None:
         """Writes what must not be lost."""
-        from ..io import save_mesh
-
         lines = self.polylines(result)
-        save_mesh(self.mesh, result.vertices, result.topology, overwrite=self.force, polylines=lines)
+        request.notes += save_result(
+            self.mesh, result.vertices, result.topology, request.mesh, force=self.force, polylines=lines,
+            marks=bool(len(lines) or self.beside),
+        )  # fmt: skip
         self._write(self.beside, request, result)
 
     def polylines(self, result: Any) -> Sequence[Tensor]:
         """Vertices of line elements of an OBJ file."""
         return ()
+
+    def lines(self) -> list[str]:
+        """What is said of what was written beside the mesh."""
+        return []
 
     def write_others(self, report: Mapping[str, Any], request: Request, result: Any) -> None:
         """Writes the rest."""
@@ -103,9 +116,84 @@ class Outputs:
         write_report(self.report, report, overwrite=self.force)
         self._write(self.pictures | self.others, request, result)
 
+    def finish(
+        self, request: Request, result: Any, lines: Sequence[str], report: Mapping[str, Any], missed: Sequence[str]
+    ) -> None:
+        """Says what came out, writes the rest, and says where it is and what was missed."""
+        print("\n".join(lines), flush=True)
+        self.write_others(report, request, result)
+        print("\n".join([*(f"wrote {path}" for path in self.paths()), *missed]))
+
     def _write(self, files: Mapping[Path, Writer], request: Request, result: Any) -> None:
         for path, writer in files.items():
             writer(path, request, result, self.force)
+
+
+def save_result(
+    path: Path,
+    vertices: Tensor,
+    topology: Topology,
+    source: PolygonMesh,
+    *,
+    force: bool,
+    polylines: Sequence[Tensor] = (),
+    marks: bool = False,
+) -> list[str]:
+    """Writes a mesh that was made from another one, and says what of the file of that it does not hold.
+
+    Groups, materials, texture coordinates and colours of an OBJ file are written back where the faces are the same;
+    polygons are cut into triangles where the format has no others.
+
+    Args:
+        path: The file.
+        vertices: (V, 3) of the mesh.
+        topology: Of the mesh.
+        source: What it was made from.
+        force: Whether a file may be replaced.
+        polylines: Line elements of an OBJ file.
+        marks: Whether line elements of the source are carried on.
+    """
+    from ..io import RhinoParts, save_mesh
+
+    suffix, notes = path.suffix.lower(), []
+    attributes = source.attributes
+    same = topology.corners.equal(source.topology.corners) and topology.face_offsets.equal(source.topology.face_offsets)
+    if attributes is not None:
+        left_out = attributes.left_out(suffix, same, marks)
+        notes += [f"{path.name} does not hold {left_out} of the input"] if left_out else []
+    if suffix in _TRIANGLES and not topology.is_triangular:
+        from ..topology import Topology
+        from ..triangulation import triangulate
+
+        notes.append(f"{path.name} holds its polygons cut into triangles: {suffix} files have no others")
+        topology = Topology.from_faces(triangulate(vertices, topology).triangles, topology.num_vertices)
+    kept = attributes if same else None
+    if isinstance(attributes, RhinoParts):
+        kept = attributes if same else attributes.of_other_faces(topology.num_faces)
+    if isinstance(kept, RhinoParts) != (suffix == ".3dm") or suffix not in _WITH_ATTRIBUTES:
+        kept = None
+    save_mesh(path, vertices, topology, overwrite=force, polylines=polylines, attributes=kept)
+    return notes
+
+
+def add_outputs(parser: argparse.ArgumentParser) -> None:
+    """Adds the options that say where they go."""
+    add = parser.add_argument
+    add(
+        "-o",
+        "--output",
+        required=True,
+        metavar="OUTPUT",
+        help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM)",
+    )
+    add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
+    add("--no-pictures", action="store_true", help="write no pictures")
+    add("--force", action="store_true", help="replace files that exist")
+
+
+def asked_for(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Arguments by name for a report, without settings."""
+    return {name: value for name, value in vars(arguments).items() if name not in _NOT_ASKED and "." not in name}
 
 
 def refuse_unknown_format(path: Path) -> None:

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 from torch.linalg import vector_norm
 
+from .._ranges import ranges
 from ..topology import Topology
 
 _NEAREST = 1e-6  # squared distance, over the mean one
@@ -90,6 +91,6 @@ def _two_rings(topology: Topology, chosen: Tensor) -> tuple[Tensor, Tensor]:
     rows, columns = rows[others], around.indices[others]
     sizes = np.bincount(rows, minlength=own.size)
     index = np.repeat(own[:, None], int(sizes.max(initial=0)), axis=1)
-    index[rows, np.arange(rows.size) - np.repeat(np.cumsum(sizes) - sizes, sizes)] = columns
+    index[rows, ranges(np.zeros_like(sizes), sizes)] = columns
     inside = np.arange(index.shape[1])[None] < sizes[:, None]
     return torch.from_numpy(index).to(chosen), torch.from_numpy(inside).to(chosen.device)

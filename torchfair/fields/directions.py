@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from torch import Tensor
+import torch
 
 from ..geometry import fitted_curvature
-from ..topology import Topology
 from .frames import Complexes, FaceFrames, Floats, Ints
 
 _FLOOR = 0.1  # of the mean curvature: a difference of curvatures below that is nothing to go by
@@ -21,34 +21,43 @@ class Directions:
     """Principal directions of the triangles of a mesh.
 
     Attributes:
-        values: (F,) traceless shape operators in the frames: half the difference of the principal curvatures, at twice
-            the angle of the direction in which the surface bends by the larger curvature (positive where convex).
+        at_corners: (F, 3) traceless shape operators in the frames at the corners of triangles: half the difference of
+            the principal curvatures, at twice the angle of the direction in which the surface bends by the larger
+            curvature (positive where convex). Between the corners they are linear.
         means: (F,) mean curvatures.
         confidence: (F,) from 0 at umbilics and in flat places, over 1 where curvatures differ as much as in
             the mean, to 1.5.
     """
 
-    values: Complexes
+    at_corners: Complexes
     means: Floats
     confidence: Floats
 
+    @cached_property
+    def values(self) -> Complexes:
+        """(F,) traceless shape operators in the middles of triangles."""
+        return np.asarray(self.at_corners.mean(1))
 
-def directions_of(vertices: Tensor, topology: Topology, frames: FaceFrames, rings: int = 2) -> Directions:
-    """Directions by polynomials fitted over rings of vertices, averaged over the corners of triangles.
+    @property
+    def turned(self) -> Directions:
+        """Those in which the surface bends by the smaller curvature."""
+        return replace(self, at_corners=-self.at_corners)
+
+
+def directions_of(frames: FaceFrames, rings: int = 2) -> Directions:
+    """Directions by polynomials fitted over rings of vertices.
 
     Args:
-        vertices: (V, 3) positions.
-        topology: a triangle mesh.
-        frames: its frames.
+        frames: of the triangles.
         rings: 2 for smooth surfaces, more where there is noise; see :func:`torchfair.geometry.fitted_curvature`.
     """
-    fitted = fitted_curvature(vertices.detach().cpu().double(), frames.topology, rings=rings)
-    whole = fitted.traceless.numpy()[frames.triangles].mean(1)
-    axes = np.stack([frames.first, frames.second], axis=1)
-    plane = axes @ whole @ axes.transpose(0, 2, 1)
-    values = (plane[:, 0, 0] - plane[:, 1, 1] + 1j * (plane[:, 0, 1] + plane[:, 1, 0])) / 2
+    fitted = fitted_curvature(torch.from_numpy(frames.points), frames.topology, rings=rings)
+    whole = fitted.traceless.numpy()[frames.triangles]
+    axes = np.stack([frames.first, frames.second], axis=1)[:, None]
+    plane = axes @ whole @ axes.transpose(0, 1, 3, 2)
+    at_corners = (plane[..., 0, 0] - plane[..., 1, 1] + 1j * (plane[..., 0, 1] + plane[..., 1, 0])) / 2
     means = fitted.mean_curvatures.numpy()[frames.triangles].mean(1)
-    return Directions(values, means, _confidence(values, means, frames.areas))
+    return Directions(at_corners, means, _confidence(at_corners.mean(1), means, frames.areas))
 
 
 def _confidence(values: Complexes, means: Floats, areas: Floats) -> Floats:
@@ -67,6 +76,16 @@ def carried_directions(directions: Directions, frames: FaceFrames, finer: FaceFr
         finer: frames of the fine mesh.
         parents: (F',) coarse triangle of every fine one, in the same plane.
     """
+    apart = finer.points[finer.triangles] - frames.centres[parents][:, None]
+    x, y = ((apart * axis[parents][:, None]).sum(-1) for axis in (frames.first, frames.second))
+    slopes = frames.gradients[parents][:, None]
+    weights = 1 / 3 + x[..., None] * slopes.real + y[..., None] * slopes.imag
+    inside = (weights * directions.at_corners[parents][:, None]).sum(-1)
+    at_corners = inside * half_turns(frames, finer, parents)[:, None]
+    return Directions(at_corners, directions.means[parents], directions.confidence[parents])
+
+
+def half_turns(frames: FaceFrames, finer: FaceFrames, parents: Ints) -> Complexes:
+    """(F',) by what traceless tensors of coarse triangles are multiplied in the frames of finer ones in them."""
     x, y = ((frames.first[parents] * axis).sum(1) for axis in (finer.first, finer.second))
-    turned = directions.values[parents] * np.exp(2j * np.arctan2(y, x))
-    return Directions(turned, directions.means[parents], directions.confidence[parents])
+    return np.asarray(np.exp(2j * np.arctan2(y, x)))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import torch
 
+from ..geometry import angle_defects
 from .direction_field import Symmetry
 from .frames import FaceFrames, Floats, Ints
 
@@ -61,6 +63,5 @@ def _turns(frames: FaceFrames, angles: Floats, matched: Ints) -> Floats:
     size = len(frames.points)
     start, end = frames.edges.T
     around = np.bincount(end, turning, size) - np.bincount(start, turning, size)
-    flat = np.where(frames.is_boundary, np.pi, 2 * np.pi)
-    defects = flat - np.bincount(frames.triangles.ravel(), frames.corner_angles.ravel(), size)
+    defects = angle_defects(torch.from_numpy(frames.points), frames.topology).numpy()
     return np.asarray((defects + around) / (2 * np.pi))

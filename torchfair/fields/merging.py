@@ -6,9 +6,11 @@ import itertools
 
 import numpy as np
 import scipy.sparse as sp
+import torch
 from scipy.sparse.csgraph import dijkstra
 
-from .direction_field import Symmetry, connection_laplacian, hermitian_solve
+from .._graph import edge_numbers
+from .direction_field import Symmetry, connection_laplacian, hermitian_solver
 from .directions import Directions
 from .frames import Bools, FaceFrames, Floats, Ints
 from .matchings import QUARTER, vertex_charges
@@ -16,6 +18,7 @@ from .matchings import QUARTER, vertex_charges
 _LOOSE = 0.05  # confidence beside moved singular vertices, relative
 _RINGS = 2  # around them
 _ROUNDS = 8
+_MOST_POSITIVE = {4: 1, 2: 2}  # four times the index where three quads or triangles meet, by symmetry
 _MOST_NEGATIVE = -4  # four times the index of a merged vertex: eight quads meet
 
 
@@ -27,6 +30,7 @@ def merge_singularities(
     smoothing: float,
     radius: float,
     symmetry: Symmetry = 4,
+    stay: Bools | None = None,
 ) -> tuple[Floats, Ints]:
     """Merges singular vertices of a field within a radius: opposite ones cancel, negative ones become one.
 
@@ -41,6 +45,7 @@ def merge_singularities(
         smoothing: as for the field.
         radius: along edges.
         symmetry: of the field, 2 or 4.
+        stay: (V,) bool: vertices that are not merged with others; none by default.
 
     Returns:
         Angles (F,) and matchings (I,); those given, where nothing is to be merged.
@@ -49,9 +54,10 @@ def merge_singularities(
     trust = np.bincount(corners, np.repeat(directions.confidence, 3), size) / np.maximum(
         np.bincount(corners, minlength=size), 1
     )
-    moved, touched = matched, np.zeros(size, bool)
+    moved, touched = _split(frames, matched, vertex_charges(frames, angles, matched), trust, radius, symmetry)
     for _ in range(_ROUNDS):
-        again, beside = _merged(frames, moved, vertex_charges(frames, angles, moved), trust, radius)
+        charges = vertex_charges(frames, angles, moved)
+        again, beside = _merged(frames, moved, charges if stay is None else np.where(stay, 0, charges), trust, radius)
         if not beside.any():
             break
         moved, touched = again, touched | beside
@@ -67,14 +73,11 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
     singular = np.flatnonzero(charges)
     if len(singular) < 2:
         return matched, touched
-    inner = ~frames.is_boundary[frames.edges].any(1)
-    (v, w), lengths = frames.edges[inner].T, frames.lengths[inner]
-    graph = sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(size, size))
-    distance, before = dijkstra(graph, indices=singular, limit=radius, return_predecessors=True)
-    number = {(int(a), int(b)): e for e, (a, b) in enumerate(frames.edges)}
+    distance, before = dijkstra(_inner_edges(frames), indices=singular, limit=radius, return_predecessors=True)
     near = distance[:, singular]
     rows, columns = np.nonzero(np.triu(np.isfinite(near), 1))
-    moved, free = matched.copy(), set(singular.tolist())
+    free = set(singular.tolist())
+    steps: list[tuple[int, int, int]] = []
     for place in np.argsort(near[rows, columns], kind="stable"):
         row, goal = rows[place], int(singular[columns[place]])
         start = int(singular[row])
@@ -86,16 +89,61 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
         while path[-1] != start:
             path.append(int(before[row, path[-1]]))
         middle = int(np.argmin(trust[path]))
-        # The charge of a vertex goes from one end of an edge to the other: a step more or less over the edge.
-        steps = [(a, b, int(charges[goal])) for a, b in itertools.pairwise(path[: middle + 1])]
+        steps += [(a, b, int(charges[goal])) for a, b in itertools.pairwise(path[: middle + 1])]
         steps += [(b, a, int(charges[start])) for a, b in itertools.pairwise(path[middle:])]
-        for a, b, charge in steps:
-            if (a, b) in number:
-                moved[number[a, b]] -= charge
-            else:
-                moved[number[b, a]] += charge
         touched[path] = True
-    return moved, touched
+    return _carried(frames, matched, steps), touched
+
+
+def _split(
+    frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, radius: float, symmetry: Symmetry
+) -> tuple[Ints, Bools]:
+    """Matchings with vertices of too large an index split, where fewer than three faces would meet.
+
+    One part after the other goes as far as the radius, each as far from those before as it can, among vertices inside.
+    """
+    touched = np.zeros(len(frames.points), bool)
+    most = _MOST_POSITIVE[symmetry]
+    for vertex in np.flatnonzero(charges > most).tolist():
+        graph = _inner_edges(frames)
+        distance, before = dijkstra(graph, indices=vertex, limit=2 * radius, return_predecessors=True)
+        near = np.flatnonzero(np.isfinite(distance) & (distance <= radius) & (charges == 0))
+        steps: list[tuple[int, int, int]] = []
+        taken: list[int] = []
+        for _ in range((int(charges[vertex]) - 1) // most):
+            if not len(near):
+                break
+            apart = np.min([distance[near], *(_apart(frames, near, other) for other in taken)], axis=0)
+            goal = int(near[np.argmax(apart)])
+            taken.append(goal)
+            path = [goal]
+            while path[-1] != vertex:
+                path.append(int(before[path[-1]]))
+            steps += [(a, b, most) for a, b in itertools.pairwise(path[::-1])]
+            touched[path] = True
+        matched = _carried(frames, matched, steps)
+    return matched, touched
+
+
+def _apart(frames: FaceFrames, vertices: Ints, other: int) -> Floats:
+    return np.asarray(np.linalg.norm(frames.points[vertices] - frames.points[other], axis=1))
+
+
+def _inner_edges(frames: FaceFrames) -> sp.csr_matrix:
+    """(V, V) lengths of the edges between vertices that are not on the boundary."""
+    inner = ~frames.is_boundary[frames.edges].any(1)
+    (v, w), lengths = frames.edges[inner].T, frames.lengths[inner]
+    size = len(frames.points)
+    return sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(size, size))
+
+
+def _carried(frames: FaceFrames, matched: Ints, steps: list[tuple[int, int, int]]) -> Ints:
+    """Matchings after charges went along edges, from one vertex to another: a step more or less over each edge."""
+    a, b, charges = np.array(steps, np.int64).reshape(-1, 3).T
+    edges = edge_numbers(frames.topology, torch.from_numpy(np.stack([a, b], 1))).numpy()
+    moved = matched.copy()
+    np.subtract.at(moved, edges, np.where(frames.edges[edges, 0] == a, charges, -charges))
+    return moved
 
 
 def _refit(
@@ -121,7 +169,8 @@ def _refit(
     count = len(frames.triangles)
     jumps = np.bincount(g, turning, count) - np.bincount(f, turning, count)
     principal, step = np.angle(directions.values) / 2, 2 * np.pi / symmetry
+    solve = hermitian_solver(stiffness)
     for _ in range(2):
         nearest = principal + step * np.rint((angles - principal) / step)
-        angles = hermitian_solve(stiffness, pull * nearest + jumps + 0j).real
+        angles = solve(pull * nearest + jumps + 0j).real
     return angles

@@ -4,6 +4,8 @@ from .denoise.noise import noise_level as noise_level
 from .denoise.recipe import DenoiseRecipe as DenoiseRecipe
 from .denoise.recipe import denoise as denoise
 from .denoise.settings import DenoiseSettings as DenoiseSettings
+from .fair.planar_quads import PLANAR_QUADS as PLANAR_QUADS
+from .fair.planar_quads import planar_quads as planar_quads
 from .fair.recipe import FairRecipe as FairRecipe
 from .fair.recipe import minimise_normal_variation as minimise_normal_variation
 from .fair.settings import FairSettings as FairSettings

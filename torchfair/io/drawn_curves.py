@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from .._ranges import ranges
 from ..errors import MeshFileError, TorchfairError
 from .obj import obj_words, statement_rows, vertex_numbers
 from .raw_mesh import Floats
 from .reading import read_bytes
-from .text import ranges, to_floats
+from .text import to_floats
 
 _FINE = 1e-4  # of the extent of a drawing: chords of arcs and splines are as near to them
 _SAMPLES = 200  # of a curve in a 3DM file that is no polyline
@@ -20,7 +24,7 @@ def obj_pieces(path: Path) -> list[Floats]:
     """Line elements ``l`` of an OBJ file, as points (n, 3)."""
     data = read_bytes(path)
     text = obj_words(path, data)
-    vertex_rows, line_rows = statement_rows(path, text, b"v", b"l")
+    vertex_rows, line_rows = statement_rows(path, text, (b"v",), (b"l",))
     if not line_rows.size:
         raise MeshFileError(path, "has no line elements (l) that could be a boundary curve")
     first = text.starts[vertex_rows] + 1
@@ -60,7 +64,7 @@ def dxf_pieces(path: Path) -> list[Floats]:
 
 
 def rhino_pieces(path: Path) -> list[Floats]:
-    """Curves of a 3DM file, as points (n, 3): the corners of polylines, others sampled."""
+    """Curves of a 3DM file, as points (n, 3): the corners of polylines, others sampled from knot to knot."""
     try:
         import rhino3dm
     except ImportError:
@@ -69,19 +73,30 @@ def rhino_pieces(path: Path) -> list[Floats]:
     model = rhino3dm.File3dm.Read(str(path))
     if model is None:
         raise MeshFileError(path, "is no 3DM file that can be read")
-    pieces = []
-    for item in model.Objects:
-        curve = item.Geometry
-        if not isinstance(curve, rhino3dm.Curve):
-            continue
-        if isinstance(curve, rhino3dm.PolylineCurve):
-            places = [curve.Point(i) for i in range(curve.PointCount)]
-        elif curve.IsLinear(1e-9):
-            places = [curve.PointAtStart, curve.PointAtEnd]
-        else:
-            start, end = curve.Domain.T0, curve.Domain.T1
-            places = [curve.PointAt(t) for t in np.linspace(start, end, _SAMPLES + 1).tolist()]
-        pieces.append(np.array([(place.X, place.Y, place.Z) for place in places]))
-    if not pieces:
+    found = [item.Geometry for item in model.Objects if isinstance(item.Geometry, rhino3dm.Curve)]
+    if not found:
         raise MeshFileError(path, "has no curves")
+    pieces = []
+    while found:
+        curve = found.pop(0)
+        if isinstance(curve, rhino3dm.PolyCurve):
+            found = [*map(curve.SegmentCurve, range(curve.SegmentCount)), *found]
+        else:
+            pieces.append(np.array([(place.X, place.Y, place.Z) for place in _rhino_places(curve)]))
     return pieces
+
+
+def _rhino_places(curve: Any) -> list[Any]:
+    """Points on one smooth curve or polyline of rhino3dm; it may have a corner at a knot."""
+    polyline = curve.TryGetPolyline()
+    if polyline is not None:
+        return [polyline[i] for i in range(len(polyline))]
+    start, end = curve.Domain.T0, curve.Domain.T1
+    nurbs = curve.ToNurbsCurve()
+    inner = {nurbs.Knots[i] for i in range(len(nurbs.Knots))} if nurbs is not None else set()
+    stops = sorted({start, end, *(knot for knot in inner if start < knot < end)})
+    places = [curve.PointAt(start)]
+    for a, b in itertools.pairwise(stops):
+        steps = math.ceil(_SAMPLES * (b - a) / (end - start))
+        places += [curve.PointAt(t) for t in np.linspace(a, b, steps + 1)[1:].tolist()]
+    return places

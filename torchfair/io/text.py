@@ -75,12 +75,6 @@ def split_words(data: bytes, first_line: int = 1) -> Words:
     return Words(data.split(), np.append(starts[filled], word_starts.size), filled + first_line)
 
 
-def ranges(starts: Ints, sizes: Ints) -> Ints:
-    """The numbers ``start, ..., start + size - 1`` of every pair, one after the other."""
-    before = np.cumsum(sizes) - sizes
-    return np.repeat(starts - before, sizes) + np.arange(int(sizes.sum()))
-
-
 def to_floats(path: Path, text: Words, positions: Ints) -> Floats:
     """The words at ``positions`` as numbers."""
     words = [text.words[i] for i in positions.tolist()]

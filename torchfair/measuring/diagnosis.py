@@ -85,14 +85,14 @@ class Diagnosis:
             "flat": _count(classes.flat),
             "saddle": _count(saddle),
             "good_saddle": _count(classes.good),
-            "bad_saddle": _count(saddle & ~classes.good),
+            "bad_saddle": _count(classes.bad_saddles),
             "neither": _count(neither),
             "degenerate_stars": _count(classes.degenerate),
             "self_intersecting_pyramids": _count(folded),
             "self_intersecting_pyramids_by_class": {
                 "convex": _count(folded & convex),
                 "good_saddle": _count(folded & classes.good),
-                "bad_saddle": _count(folded & saddle & ~classes.good),
+                "bad_saddle": _count(folded & classes.bad_saddles),
                 "neither": _count(folded & neither),
             },
             "pyramid_self_intersections": int(self.crossings.sum()),
@@ -121,8 +121,7 @@ class Diagnosis:
             raise ShapeError("count", "0 or more", count)
         classes, crossings = self.classes, self.crossings
         neither = classes.is_kind(StarKind.NEITHER)
-        bad = classes.is_kind(StarKind.SADDLE) & ~classes.good
-        suspect = torch.nonzero((crossings > 0) | neither | bad).squeeze(1)
+        suspect = torch.nonzero((crossings > 0) | classes.bad).squeeze(1)
         # Sorted by the least important key first; a perimeter rounded to 1e-9 keeps ties in the order of the numbers.
         for key in ((self.perimeters * 1e9).round(), neither.to(torch.int64), crossings):
             suspect = suspect[key[suspect].argsort(descending=True, stable=True)]

@@ -15,7 +15,7 @@ from ..errors import MeshError, TorchfairError
 from ..geometry import edge_lengths, star_normals
 from ..geometry.tangent_basis import tangent_bases
 from ..principal import LARGE_MISALIGNMENT, principal_edges_from_directions
-from ..stars import StarKind, classify_stars, pyramid_self_intersections
+from ..stars import classify_stars, pyramid_self_intersections
 from ..topology import Topology
 from .diagnosis import Diagnosis
 
@@ -106,8 +106,7 @@ class _Patch:
         topology = Topology.from_faces(faces, count * len(trials))
         vertices = torch.cat([trial.vertices for trial in trials])
         classes = classify_stars(vertices, topology)
-        wrong = (classes.is_kind(StarKind.SADDLE) & ~classes.good) | classes.is_kind(StarKind.NEITHER)
-        wrong |= pyramid_self_intersections(vertices, topology) > 0
+        wrong = classes.bad | (pyramid_self_intersections(vertices, topology) > 0)
         numbers: list[int] = (wrong.view(-1, count) & self._own).sum(1).tolist()
         return numbers
 

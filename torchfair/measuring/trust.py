@@ -47,7 +47,7 @@ def curvature_doubts(measures: Mapping[str, float]) -> list[str]:
     """Reasons not to trust C, in words; empty where there are none.
 
     Args:
-        measures: From :func:`fold_measures`.
+        measures: From :func:`fold_measures`, or of the same names.
 
     Example::
 

@@ -1,24 +1,27 @@
-"""One attempt at a mesh: field, cut, map, cells, and their verification."""
+"""One attempt at a mesh of a surface that is cut open: map, cells, and their verification."""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from ..boundary import boundary_corners
 from ..errors import MeshError
-from ..fields import Directions, FaceFrames, Symmetry, direction_field, matchings, merge_singularities, vertex_charges
 from ..fields.frames import Floats, Ints
-from ..fields.matchings import QUARTER
 from .boundary_cells import Compact, compact, tidy_boundary
-from .boundary_runs import BoundaryRun, find_runs, inward_moves
-from .crossings import off_the_lines
-from .cut_graph import CutGraph, cut_open
+from .boundary_runs import BoundaryRun, find_runs
+from .crease_runs import crease_lines
+from .creases import Creases
+from .cut_graph import CutGraph
 from .integers import split_integers
 from .lattice import Lattice
+from .off_lines import off_the_lines
+from .relaxation import loosened, stretched
 from .seamless_map import MapProblem, SeamlessMap
-from .seams import find_seams
+from .seams import Seams, find_seams
 from .settings import MeshingSettings
 from .surface import DesignSurface
 from .tracing import Cells, trace_cells
@@ -26,7 +29,7 @@ from .untangling import untangled
 from .verification import shape_of, verified_topology
 
 _ANISOTROPY = 30.0  # of the map: 1 triples the angles to directions, 300 wins little and stretches edges
-_UNTANGLED = 3  # maps, the best first
+_UNTANGLED = 2  # maps, the best first
 _SHORTEST_RUN = 1.5  # spacings
 
 
@@ -37,12 +40,14 @@ class Plan:
     Attributes:
         spacing: length of edges.
         smoothing: length over which directions are smoothed.
-        align: whether boundary runs become lines.
+        align: whether boundary runs and creases become lines.
+        creases: whether creases are kept at all.
     """
 
     spacing: float
     smoothing: float
     align: bool
+    creases: bool = True
 
 
 class FailedAttemptError(MeshError):
@@ -66,69 +71,48 @@ class PieceMesh:
         positions: (N, 3).
         faces: nodes counterclockwise.
         rows: pairs of nodes, edges with the second coordinate constant.
+        creases: (C, 2) nodes of the edges along creases.
+        sharp: (n, 2, 3) ends of the edges of the surface that they stand for.
         singular_places, singular_charges: of the field.
     """
 
     positions: Floats
     faces: list[list[int]]
     rows: set[tuple[int, int]]
+    creases: Ints
+    sharp: Floats
     singular_places: Floats
     singular_charges: Ints
 
 
 def attempt(
-    surface: DesignSurface, directions: Directions, lattice: Lattice, plan: Plan, settings: MeshingSettings
+    surface: DesignSurface, creases: Creases, graph: CutGraph, lattice: Lattice, plan: Plan, settings: MeshingSettings
 ) -> PieceMesh:
-    """Meshes a component as planned.
+    """Meshes a component with creases as planned, cut open with the field of the plan.
 
     Raises:
         FailedAttemptError: if that gives no valid mesh.
     """
     frames = surface.frames
-    graph = _combed(frames, directions, lattice.symmetry, plan, settings)
-    runs: list[BoundaryRun] = []
-    if plan.align:
-        shortest = _SHORTEST_RUN * plan.spacing
-        runs = find_runs(frames, graph, settings.boundary_angle, shortest, lattice.aligned)
-    corners = boundary_corners(surface.vertices, surface.topology, settings.corner_angle).numpy()
-    found = _map(surface, graph, lattice, plan, runs)
-    inward = inward_moves(found.seams, found.values, frames.triangles, runs)
+    seams = find_seams(frames, graph)
+    spacings = _spacings(surface, graph, plan)
+    shortest, components = _SHORTEST_RUN * spacings.max(1), lattice.aligned if plan.align else ()
+    lines = crease_lines(frames, graph, seams, creases, settings.boundary_angle, shortest, components)
+    graph = replace(graph, nodes=graph.nodes | lines.pinned)
+    runs = find_runs(frames, graph, settings.boundary_angle, shortest, components) if settings.align_boundary else []
+    corners = boundary_corners(surface.vertices, surface.topology, settings.corner_angle).numpy() | creases.corners
+    found = _map(surface, graph, seams, lattice, spacings, [*runs, *itertools.chain(*lines.runs)])
     try:
-        cells = trace_cells(found, off_the_lines(found, inward), corners)
-        area = lattice.cell * plan.spacing**2
-        whole = compact(tidy_boundary(cells, plan.spacing, area))
+        cells = trace_cells(found, off_the_lines(found, runs, lines), corners & ~graph.nodes, lines)
+        near = spacings[KDTree(frames.centres).query(cells.positions)[1]] if surface.sizes else spacings[:1]
+        whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1)))
         verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
-    except FailedAttemptError:
-        raise
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None
     singular = np.flatnonzero(graph.charges)
     places, charges = frames.points[singular], graph.charges[singular]
-    return PieceMesh(whole.positions, whole.faces, _rows(cells, whole), places, charges)
-
-
-def _combed(
-    frames: FaceFrames, directions: Directions, symmetry: Symmetry, plan: Plan, settings: MeshingSettings
-) -> CutGraph:
-    """The mesh cut open, with a field of directions.
-
-    Crosses are tried for directions, too: the larger and the smaller curvature change places where the surface has an
-    umbilic line, crosses go on. They will do if one of their two directions never comes back as the other.
-    """
-    radius = settings.merging * plan.spacing
-    tried: tuple[Symmetry, ...] = (4, 2) if symmetry == 2 else (4,)
-    for of in tried:
-        angles = direction_field(frames, directions, plan.smoothing, of)
-        matched = matchings(frames, angles, of)
-        angles, matched = merge_singularities(frames, angles, matched, directions, plan.smoothing, radius, of)
-        graph = cut_open(frames, angles, matched, vertex_charges(frames, angles, matched))
-        if symmetry == 4 or not (graph.quarters % 2).any():
-            break
-    if symmetry == 4:
-        return graph
-    along = directions.values * np.exp(-2j * graph.angles)
-    across = float(frames.areas @ along.real) < 0
-    return replace(graph, angles=graph.angles + QUARTER) if across else graph
+    sharp = frames.points[frames.edges[creases.edges]]
+    return PieceMesh(whole.positions, whole.faces, _rows(cells, whole), whole.creases, sharp, places, charges)
 
 
 def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
@@ -143,28 +127,46 @@ def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
     return {(int(a), int(b)) for a, b in numbered if 0 <= a < b}
 
 
-def _map(surface: DesignSurface, graph: CutGraph, lattice: Lattice, plan: Plan, runs: list[BoundaryRun]) -> SeamlessMap:
+def _spacings(surface: DesignSurface, graph: CutGraph, plan: Plan) -> Floats:
+    """(F, 2) lengths of edges along the field and across, but for those of the lattice."""
+    if surface.sizes is None:
+        return np.full((len(surface.frames.areas), 2), plan.spacing)
+    return np.asarray(plan.spacing * np.exp(surface.sizes.along(graph.angles)))
+
+
+def _map(
+    surface: DesignSurface, graph: CutGraph, seams: Seams, lattice: Lattice, spacings: Floats, runs: list[BoundaryRun]
+) -> SeamlessMap:
     """A map that is one to one near every point."""
     frames = surface.frames
-    seams = find_seams(frames, graph)
     count = len(frames.triangles)
     problem = MapProblem(
         frames=frames,
         graph=graph,
         seams=seams,
-        split=split_integers(frames, graph, seams, runs, 0.5 + 0.5j),
+        split=split_integers(frames, graph, seams, runs),
         shear=lattice.matrix,
-        density=np.tile(1 / (plan.spacing * np.array(lattice.spacings)), (count, 1)),
+        density=1 / (spacings * lattice.spacings),
         anisotropy=np.full(count, _ANISOTROPY),
     )
-    best: SeamlessMap | None = None
-    for candidate in problem.candidates()[:_UNTANGLED]:
-        best = untangled(problem, candidate)
-        if best.is_sound:
-            return best
-    assert best is not None
+    wanted, problem = problem.density, stretched(problem)
+    best = _untangled(problem)
+    looser = problem if best.is_sound else loosened(problem, wanted)
+    if looser is not problem:
+        best = _untangled(looser)
+    if best.is_sound:
+        return best
     vertices = best.branches if len(best.branches) else frames.triangles[best.flips[0]]
     raise _failure(surface, int(vertices[0]))
+
+
+def _untangled(problem: MapProblem) -> SeamlessMap:
+    """The first map that is one to one near every point, or the last that was tried."""
+    for candidate in problem.candidates()[:_UNTANGLED]:
+        found = untangled(problem, candidate)
+        if found.is_sound:
+            break
+    return found
 
 
 def _failure(surface: DesignSurface, vertex: int) -> FailedAttemptError:

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..fields.frames import Bools, FaceFrames, Floats, Ints
+from .._ranges import ranges
+from ..fields.frames import Bools, Floats, Ints
 from .seamless_map import SeamlessMap
 from .seams import ROTATIONS
-
-_MARGIN = 1e-7  # by which vertices that are not singular stay off the lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +34,10 @@ class Crossings:
     values: np.ndarray
 
 
-def find_crossings(found: SeamlessMap, values: np.ndarray) -> Crossings:
-    """The crossings of a seamless map, for values of copies off the lines."""
-    frames, at_corners = found.frames, values[found.seams.copies]
-    face, corner = left_corners(frames)
+def find_crossings(found: SeamlessMap, at_corners: np.ndarray) -> Crossings:
+    """The crossings of a seamless map, for values (F, 3) at corners off the lines."""
+    frames = found.frames
+    face, corner = frames.left_corners
     start, end = at_corners[face, corner], at_corners[face, (corner + 1) % 3]
     parts = [_levels(getattr(start, part), getattr(end, part)) for part in ("real", "imag")]
     edge, level, along = (np.concatenate([part[k] for part in parts]) for k in range(3))
@@ -52,47 +51,13 @@ def find_crossings(found: SeamlessMap, values: np.ndarray) -> Crossings:
     )
 
 
-def off_the_lines(found: SeamlessMap, inward: np.ndarray | None = None) -> np.ndarray:
-    """Values of copies, those of vertices that are not singular moved off whole numbers by a hair.
-
-    Args:
-        found: the map.
-        inward: (V,) complex, by how much vertices on boundary lines are to move into the surface, in the frame of
-            the value of the vertex.
-    """
-    seams, graph = found.seams, found.graph
-    own = np.zeros(len(graph.singular), complex)
-    is_own = np.ones(len(seams.vertex), bool)
-    is_own[list(seams.terms)] = [not seams.terms[c] and seams.unit[c] == 1 for c in seams.terms]
-    own[seams.vertex[is_own]] = found.values[is_own]
-    move = np.zeros(len(own), complex) if inward is None else inward.copy()
-    for part, factor in ((own.real, 1), (own.imag, 1j)):
-        to_line = part - np.rint(part)
-        close = (np.abs(to_line) < _MARGIN) & ((move.real if factor == 1 else move.imag) == 0)
-        move[close] += factor * (np.where(to_line[close] < 0, -_MARGIN, _MARGIN) - to_line[close])
-    move[graph.singular] = 0
-    return np.asarray(found.values + seams.unit * move[seams.vertex])
-
-
-def left_corners(frames: FaceFrames) -> tuple[Ints, Ints]:
-    """(E,) left face of every edge, boundary edges included, and its corner where the edge starts."""
-    topology = frames.topology
-    edge_of = topology.corner_edges.numpy()
-    outer = np.flatnonzero(edge_of >= topology.num_interior_edges)
-    face, corner = np.zeros((2, topology.num_edges), np.int64)
-    inner = topology.num_interior_edges
-    face[:inner], corner[:inner] = frames.faces[:, 0], frames.corners[:, 0]
-    face[edge_of[outer]], corner[edge_of[outer]] = outer // 3, outer % 3
-    return face, corner
-
-
 def _levels(start: Floats, end: Floats) -> tuple[Ints, Ints, Floats]:
     """Whole numbers strictly between values at starts and ends: edges, numbers, places along the edge."""
     low, high = np.minimum(start, end), np.maximum(start, end)
     first = np.floor(low).astype(np.int64) + 1
     counts = np.maximum(np.ceil(high).astype(np.int64) - first, 0)
     edge = np.repeat(np.arange(len(start)), counts)
-    level = np.repeat(first, counts) + np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+    level = ranges(first, counts)
     return edge, level, (level - start[edge]) / (end - start)[edge]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..fields.frames import Floats
+from .polygon_area import area_vector
 
 Pair = tuple[int, int]
 
@@ -38,7 +39,7 @@ def _pair(a: int, b: int) -> Pair:
 def _ears(positions: Floats, face: list[int]) -> list[list[int]]:
     """Cuts off the corner with the shortest diagonal that turns no triangle over, again and again."""
     triangles = []
-    normal = _area_vector(positions, face)
+    normal = area_vector(positions, face)
     while len(face) > 3:
         ears = [(_ear_cost(positions, face, k, normal), k) for k in range(len(face))]
         corner = min(ears)[1]
@@ -51,10 +52,5 @@ def _ear_cost(positions: Floats, face: list[int], corner: int, normal: Floats) -
     """Whether cutting off a corner turns it or the rest over, and the length of the cut."""
     before, after = face[corner - 1], face[(corner + 1) % len(face)]
     rest = face[:corner] + face[corner + 1 :]
-    areas = [_area_vector(positions, part) @ normal for part in ([before, face[corner], after], rest)]
+    areas = [area_vector(positions, part) @ normal for part in ([before, face[corner], after], rest)]
     return bool(min(areas) <= 0), float(np.linalg.norm(positions[before] - positions[after]))
-
-
-def _area_vector(positions: Floats, face: list[int]) -> Floats:
-    points = positions[face]
-    return np.asarray(np.cross(points[1:-1] - points[0], points[2:] - points[0]).sum(0) / 2)

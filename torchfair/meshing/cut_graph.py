@@ -30,18 +30,18 @@ class CutGraph:
         quarters: (I,) quarter turns over edges, 0 to 3, 0 where there is no cut.
         cut: (I,) bool.
         charges: (V,) four times the index.
-        singular: (V,) bool: where it is not 0.
         paths: place of every cut edge; all edges of a path turn alike.
         num_paths: their number.
+        nodes: (V,) bool: vertices that become points of the lattice, singular ones among them.
     """
 
     angles: Floats
     quarters: Ints
     cut: Bools
     charges: Ints
-    singular: Bools
     paths: dict[int, PathEdge]
     num_paths: int
+    nodes: Bools
 
 
 def cut_open(frames: FaceFrames, angles: Floats, matched: Ints, charges: Ints) -> CutGraph:
@@ -67,19 +67,24 @@ def cut_open(frames: FaceFrames, angles: Floats, matched: Ints, charges: Ints) -
     cut = ~tree
     _prune(frames, cut, singular)
     paths, count = _paths(frames, cut, singular)
-    return CutGraph(angles + QUARTER * turned, quarters % 4, cut, charges, singular, paths, count)
+    return CutGraph(angles + QUARTER * turned, quarters % 4, cut, charges, paths, count, singular)
+
+
+def dual_graph(frames: FaceFrames) -> sp.csr_matrix:
+    """(F, F) distances of the centres of faces that share an edge."""
+    f, g = frames.faces.T
+    count = len(frames.triangles)
+    lengths = np.linalg.norm(frames.centres[f] - frames.centres[g], axis=1)
+    return sp.csr_matrix((np.r_[lengths, lengths], (np.r_[f, g], np.r_[g, f])), shape=(count, count))
 
 
 def _dual_tree(frames: FaceFrames) -> tuple[Bools, Ints, Ints]:
     """Edges of a tree of shortest paths over the faces from the middle, faces in its order, and edges to parents."""
     f, g = frames.faces.T
-    count = len(frames.triangles)
     centres = frames.centres
-    lengths = np.linalg.norm(centres[f] - centres[g], axis=1)
-    graph = sp.csr_matrix((np.r_[lengths, lengths], (np.r_[f, g], np.r_[g, f])), shape=(count, count))
     middle = int(np.argmin(((centres - frames.areas @ centres / frames.areas.sum()) ** 2).sum(1)))
-    distance, before = dijkstra(graph, True, np.array(middle), True)
-    number = np.full(count, -1)
+    distance, before = dijkstra(dual_graph(frames), True, np.array(middle), True)
+    number = np.full(len(centres), -1)
     edges = np.arange(len(f))
     towards_g, towards_f = before[g] == f, before[f] == g
     number[g[towards_g]] = edges[towards_g]

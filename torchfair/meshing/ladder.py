@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator
+from functools import cache
 
 from ..errors import MeshError
 from ..fields import Directions
 from .attempt import FailedAttemptError, PieceMesh, Plan, attempt
+from .combing import combed
+from .creases import Creases, find_creases
+from .cut_graph import CutGraph
 from .lattice import Lattice
 from .settings import MeshingSettings
 from .surface import DesignSurface
 
-_SMOOTHER = (1.0, 4.0, 16.0)  # times the smoothing length
+_SMOOTHER = (1.0, 4.0, 16.0, 64.0)  # times the smoothing length
 _SPACINGS = (1.0, 0.967, 1.037, 0.934, 1.08)  # counts up and down by 7 and 15 %
 
 
@@ -35,40 +40,75 @@ def mesh_component(
     spacing: float,
     smoothing: float,
     settings: MeshingSettings,
-) -> tuple[PieceMesh, str]:
-    """The mesh of a component by the first plan that gives a valid one, and what was changed, in words.
+    first: int = 0,
+) -> tuple[PieceMesh, str, int]:
+    """The mesh of a component by the first plan that gives a valid one, what was changed, and the plan's number.
+
+    Args:
+        surface: the component.
+        directions: of its triangles.
+        lattice: that is laid on it.
+        spacing: length of edges.
+        smoothing: of directions, over the spacing.
+        settings: of the mesh.
+        first: number of the plan to begin with.
 
     Raises:
         NoMeshError: if none does.
     """
-    began = time.monotonic()
+    began = time.process_time()
     failure: FailedAttemptError | None = None
     number = 0
-    for plan, words in plans(spacing, smoothing, settings):
-        if number and (not settings.fallback or time.monotonic() - began > settings.time_limit):
-            break
+
+    @cache
+    def finer(spacing: float) -> tuple[DesignSurface, Directions]:
+        return surface.cut_finer(directions, spacing)
+
+    @cache
+    def creases(spacing: float, kept: bool) -> Creases:
+        triangles = finer(spacing)[0]
+        sharp = triangles.sharp & kept
+        return find_creases(triangles.frames, sharp, settings.corner_angle, spacing)
+
+    @cache
+    def graph(spacing: float, smoothing: float, kept: bool) -> CutGraph:
+        triangles, carried = finer(spacing)
+        merging, sharp = settings.merging * spacing, creases(spacing, kept)
+        return combed(triangles.frames, carried, lattice.symmetry, smoothing, merging, sharp, settings.boundary_angle)
+
+    tried = enumerate(plans(spacing, smoothing, settings, bool(surface.sharp.any())))
+    for place, (plan, words) in itertools.islice(tried, first, None):
+        late = plan.creases and time.process_time() - began > settings.time_limit
+        if number and (not settings.fallback or late):
+            continue
         number += 1
-        finer, carried = surface.cut_finer(directions, plan.spacing)
         try:
-            return attempt(finer, carried, lattice, plan, settings), words
+            field = graph(plan.spacing, plan.smoothing, plan.creases)
+            sharp = creases(plan.spacing, plan.creases)
+            return attempt(finer(plan.spacing)[0], sharp, field, lattice, plan, settings), words, place
         except FailedAttemptError as error:
             failure = error if failure is None or failure.vertex < 0 else failure
     assert failure is not None
     raise NoMeshError(_refusal(failure, number), failure.vertex)
 
 
-def plans(spacing: float, smoothing: float, settings: MeshingSettings) -> Iterator[tuple[Plan, str]]:
-    """What is tried, and how that differs from what was asked for."""
+def plans(spacing: float, smoothing: float, settings: MeshingSettings, creased: bool) -> Iterator[tuple[Plan, str]]:
+    """What is tried, and how that differs from what was asked for; without the creases at last, where there are any."""
+    can_align = settings.align_boundary or creased
     for scale in _SPACINGS:
         for smoother in _SMOOTHER:
-            for align in (True, False) if settings.align_boundary else (False,):
+            for align in (True, False) if can_align else (False,):
                 plan = Plan(spacing * scale, spacing * smoothing * smoother, align)
                 words = [
                     f"directions smoothed over {smoothing * smoother:g} edges" if smoother != 1 else "",
-                    "boundary not aligned" if settings.align_boundary and not align else "",
+                    f"{'boundary and creases' if creased else 'boundary'} not aligned"
+                    if can_align and not align
+                    else "",
                     f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces" if scale != 1 else "",
                 ]
                 yield plan, ", ".join(filter(None, words))
+    if creased:
+        yield Plan(spacing, spacing * smoothing, settings.align_boundary, creases=False), "creases not kept"
 
 
 def _refusal(failure: FailedAttemptError, number: int) -> str:

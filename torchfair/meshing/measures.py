@@ -38,10 +38,12 @@ def angles_to_directions(
         chosen: (I,) bool: the inner edges to look at, all by default.
     """
     ends = vertices[topology.interior_edges if chosen is None else topology.interior_edges[chosen]]
-    faces = surface.closest(ends.mean(1)).faces.cpu().numpy()
+    closest = surface.closest(ends.mean(1))
+    faces, weights = closest.faces.cpu().numpy(), closest.weights.cpu().numpy()
+    principal = np.angle((weights * directions.at_corners[faces]).sum(1))
     along = (ends[:, 1] - ends[:, 0]).cpu().numpy()
     x, y = ((along * axis[faces]).sum(1) for axis in (frames.first, frames.second))
-    against = 2 * np.arctan2(y, x) - np.angle(directions.values[faces])
+    against = 2 * np.arctan2(y, x) - principal
     angles = np.abs(np.arctan2(np.sin(2 * against), np.cos(2 * against))) / 4
     return np.asarray(angles[has_direction(directions, spacing)[faces]])
 

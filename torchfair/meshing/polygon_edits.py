@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..fields.frames import Bools, Floats
+from ..fields.frames import Bools, Floats, Ints
+from .polygon_area import area_vector
 
 Edge = tuple[int, int]
 
@@ -18,19 +19,31 @@ class PolygonEdits:
     Args:
         positions: (N, 3), changed in place.
         faces: nodes counterclockwise, each at least three.
-        on_boundary: (N,) bool, changed in place.
+        on_boundary: (N,) bool.
         fixed: (N,) bool: nodes that keep their places.
+        creases: (C, 2) nodes of edges that stay edges, such as those along creases; none by default.
+
+    Attributes:
+        on_curve: (N,) bool: nodes on the boundary or on creases.
+        beside: neighbours of nodes along creases.
     """
 
-    def __init__(self, positions: Floats, faces: list[list[int]], on_boundary: Bools, fixed: Bools) -> None:
-        self.positions, self.on_boundary, self.fixed = positions, on_boundary, fixed
+    def __init__(
+        self, positions: Floats, faces: list[list[int]], on_boundary: Bools, fixed: Bools, creases: Ints | None = None
+    ) -> None:
+        self.positions, self.on_curve, self.fixed = positions, on_boundary.copy(), fixed
+        self.beside: dict[int, set[int]] = defaultdict(set)
+        for a, b in [] if creases is None else creases.tolist():
+            self.on_curve[[a, b]] = True
+            self.beside[a].add(b)
+            self.beside[b].add(a)
         self.faces = {number: list(face) for number, face in enumerate(faces)}
         self.went: dict[int, int] = {}
         self.around: dict[int, set[int]] = defaultdict(set)
         for number, face in self.faces.items():
             for node in face:
                 self.around[node].add(number)
-        self.normals = {number: self.area_vector(face) for number, face in self.faces.items()}
+        self.normals = {number: area_vector(self.positions, face) for number, face in self.faces.items()}
 
     def place_of(self, node: int) -> int:
         """The node that a node was collapsed to, itself if it was not."""
@@ -38,21 +51,15 @@ class PolygonEdits:
             node = self.went[node]
         return node
 
-    def area_vector(self, face: list[int]) -> Floats:
-        """Of a polygon."""
-        x, y, z = self.positions[face].T
-        a, b, c = np.roll(x, -1), np.roll(y, -1), np.roll(z, -1)
-        return np.array([y @ c - z @ b, z @ a - x @ c, x @ b - y @ a]) / 2
-
     def area(self, number: int) -> float:
         """Of a face, along the normal that it had at first."""
         first = self.normals[number]
         size = float(np.linalg.norm(first))
-        return float(self.area_vector(self.faces[number]) @ first) / size if size else 0.0
+        return float(area_vector(self.positions, self.faces[number]) @ first) / size if size else 0.0
 
-    def boundary_faces(self) -> list[int]:
-        """Faces with a node on the boundary."""
-        return [number for number, face in self.faces.items() if self.on_boundary[face].any()]
+    def curve_faces(self) -> list[int]:
+        """Faces with a node on the boundary or on a crease."""
+        return [number for number, face in self.faces.items() if self.on_curve[face].any()]
 
     def sides(self, number: int) -> Iterator[Edge]:
         """The edges of a face."""
@@ -71,20 +78,24 @@ class PolygonEdits:
         """Of an edge."""
         return float(np.linalg.norm(self.positions[edge[0]] - self.positions[edge[1]]))
 
-    def collapse(self, edge: Edge, inner: bool) -> bool:
-        """Collapses an edge to the end that is to stay: a fixed one, or one on the boundary.
+    def collapse(self, edge: Edge) -> bool:
+        """Collapses an edge to the end that is to stay: a fixed one, or one on the boundary or on a crease.
 
         Args:
-            edge: two nodes.
-            inner: whether it has faces on both sides.
+            edge: two nodes, in either order.
 
         Returns:
-            Whether that left a manifold without faces turned over; otherwise nothing has changed.
+            Whether it is an edge and that left a manifold without faces turned over; otherwise nothing has changed.
         """
         stays, goes = edge
         if self._rank(goes) > self._rank(stays):
             stays, goes = goes, stays
-        if self.fixed[goes] or (inner and self.on_boundary[stays] and self.on_boundary[goes]):
+        shared = self.around[stays] & self.around[goes]
+        sides = sum(self._has(number, edge) or self._has(number, edge[::-1]) for number in shared)
+        is_curve = sides == 1 or stays in self.beside[goes]
+        if not sides or self.fixed[goes] or (not is_curve and self.on_curve[stays] and self.on_curve[goes]):
+            return False
+        if self.beside[stays] & self.beside[goes] or (self.beside[goes] and stays not in self.beside[goes]):
             return False
         changed: dict[int, list[int]] = {}
         for number in self.around[stays] | self.around[goes]:
@@ -93,15 +104,15 @@ class PolygonEdits:
             if len(set(face)) != len(face):
                 return False
             changed[number] = face if len(face) >= 3 else []
-        return self._allowed(changed) and self._apply(changed, goes, bool(self.on_boundary[goes]), stays)
+        return self._allowed(changed) and self._apply(changed, goes, stays)
 
     def _rank(self, node: int) -> tuple[bool, bool, int]:
-        return bool(self.fixed[node]), bool(self.on_boundary[node]), len(self.around[node])
+        return bool(self.fixed[node]), bool(self.on_curve[node]), len(self.around[node])
 
     def merge(self, number: int, edge: Edge) -> bool:
         """Makes one face of a face and its neighbour across an edge; see :meth:`collapse`."""
         other = self.across(edge, number)
-        if other is None:
+        if other is None or edge[1] in self.beside[edge[0]]:
             return False
         ours, theirs = self.faces[number], self.faces[other]
         i, j = ours.index(edge[1]), theirs.index(edge[0])
@@ -112,7 +123,7 @@ class PolygonEdits:
         if not self._allowed(changed):
             return False
         self.normals[number] = self.normals[number] + self.normals[other]
-        return self._apply(changed, None, False, None)
+        return self._apply(changed)
 
     def drop_straight_nodes(self, number: int) -> None:
         """Takes nodes out of a face that it has alone, apart from fixed ones."""
@@ -120,7 +131,7 @@ class PolygonEdits:
             face = self.faces[number]
             if len(face) > 3 and len(self.around[node]) == 1 and not self.fixed[node]:
                 without = [other for other in face if other != node]
-                if self.area_vector(without) @ self.normals[number] > 0:
+                if area_vector(self.positions, without) @ self.normals[number] > 0:
                     self.faces[number] = without
                     del self.around[node]
 
@@ -136,7 +147,7 @@ class PolygonEdits:
 
     def _keeps_side(self, number: int, face: list[int]) -> bool:
         normal = self.normals[number]
-        area = self.area_vector(face)
+        area = area_vector(self.positions, face)
         return float(area @ normal) > 0.2 * float(np.linalg.norm(area)) * float(np.linalg.norm(normal))
 
     def _is_fan(self, node: int, changed: dict[int, list[int]]) -> bool:
@@ -160,7 +171,7 @@ class PolygonEdits:
                 return step == len(after) and (at == first or bool(starts))
         return False
 
-    def _apply(self, changed: dict[int, list[int]], gone: int | None, reaches: bool, stays: int | None) -> bool:
+    def _apply(self, changed: dict[int, list[int]], gone: int | None = None, stays: int | None = None) -> bool:
         for number, face in changed.items():
             for node in self.faces[number]:
                 self.around[node].discard(number)
@@ -173,6 +184,9 @@ class PolygonEdits:
         if gone is not None and stays is not None:
             del self.around[gone]
             self.went[gone] = stays
-        if stays is not None and reaches:
-            self.on_boundary[stays] = True
+            self.on_curve[stays] |= self.on_curve[gone]
+            for node in self.beside.pop(gone, set()) - {stays}:
+                self.beside[node] ^= {gone, stays}
+                self.beside[stays].add(node)
+            self.beside[stays].discard(gone)
         return True

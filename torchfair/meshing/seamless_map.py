@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,12 +13,16 @@ import torch
 from ..fields.frames import FaceFrames, Floats, Ints
 from ..fields.matchings import QUARTER
 from ..linear import Factor, RslabDirect, factorise
-from .closest_vectors import closest_vectors
 from .cut_graph import CutGraph
-from .integers import IntegerSplit
+from .integers import IntegerSplit, real_form
 from .seams import ROTATIONS, Seams
+from .separation import gaps, separate_vectors
+
+WANTED = np.array([1.0, 0.0, 0.0, 1.0])
+"""Jacobian of a map as wanted: gradients of the first coordinate along and across the field, then of the second."""
 
 _TRIED = 16  # whole vectors, until no triangle is turned over
+_NEAR = 2.5  # spacings: singular vertices within that are kept apart
 _THIN = 0.05  # of the area wanted, below which triangles are counted as nearly turned over
 
 
@@ -66,6 +71,21 @@ class SeamlessMap:
         return np.where(self.graph.cut, np.rint(steps.real) + 1j * np.rint(steps.imag), 0)
 
 
+class _Optimum(NamedTuple):
+    """Values of copies as whole numbers y say, all others following: ``base + moves @ y``.
+
+    Attributes:
+        base: (2N,) where all whole numbers are zero.
+        moves: (2N, k) by each whole number.
+        metric, target: the least squares are ``(y - target)^T metric (y - target)``, (k, k) and (k,).
+    """
+
+    base: Floats
+    moves: Floats
+    metric: Floats
+    target: Floats
+
+
 @dataclass(frozen=True, eq=False)
 class MapProblem:
     """Least squares for the gradients of a seamless map, factorised once.
@@ -90,6 +110,28 @@ class MapProblem:
 
         There is one only if it has nothing turned over.
         """
+        optimum = self._optimum
+        if not len(optimum.target):
+            return [self.map_of(optimum.base.copy())]
+        near = _NEAR * float(np.median(self.density.prod(1))) ** -0.5
+        between = real_form(gaps(self.frames, self.graph, self.seams, near))
+        rows, offsets = between @ optimum.moves, between @ optimum.base
+        found = []
+        for vector in separate_vectors(optimum.metric, optimum.target, rows, offsets)[:_TRIED]:
+            found.append(self.map_of(optimum.base + optimum.moves @ vector))
+            if found[-1].is_sound:
+                return [found[-1]]
+        return sorted(found, key=badness)
+
+    @property
+    def real_jacobians(self) -> Floats:
+        """(4, F) of the optimum whose whole numbers may be any numbers, rows as in :meth:`jacobians`."""
+        optimum = self._optimum
+        parts = optimum.base + optimum.moves @ optimum.target
+        return np.asarray(self.jacobians(np.arange(len(self.density))) @ parts).reshape(4, -1)
+
+    @cached_property
+    def _optimum(self) -> _Optimum:
         rows, right = self._rows()
         free = (rows @ self.split.free).tocsc()
         whole = np.asarray((rows @ self.split.whole) @ self.split.basis)
@@ -97,26 +139,22 @@ class MapProblem:
         factor = factorise((free.T @ free).tocsr(), solver="rslab" if RslabDirect.available() else "scipy")
         best = _solve(factor, free.T @ right)
         base = self.split.free @ best + self.split.fixed
-        if not whole.shape[1]:
-            return [self.map_of(base)]
+        count = whole.shape[1]
+        if not count:
+            return _Optimum(base, np.zeros((len(base), 0)), np.zeros((0, 0)), np.zeros(0))
         mixed = free.T @ whole
         answers = _solve(factor, mixed)
         metric = whole.T @ whole - mixed.T @ answers
         metric = (metric + metric.T) / 2
         scale = np.linalg.eigvalsh(metric)[-1]
-        target = np.linalg.lstsq(metric + 1e-13 * scale * np.eye(len(metric)), whole.T @ right - mixed.T @ best)[0]
+        target = np.linalg.lstsq(metric + 1e-13 * scale * np.eye(count), whole.T @ right - mixed.T @ best)[0]
         moves = np.asarray(self.split.whole @ self.split.basis - self.split.free @ answers)
-        found = []
-        for vector in closest_vectors(metric / scale, target).vectors[:_TRIED]:
-            found.append(self.map_of(base + moves @ vector))
-            if found[-1].is_sound:
-                return [found[-1]]
-        return sorted(found, key=badness)
+        return _Optimum(base, moves, metric / scale, target)
 
     def map_of(self, parts: Floats) -> SeamlessMap:
         """The map whose copies have real and imaginary parts (2N,) in turn."""
         values = parts[::2] + 1j * parts[1::2]
-        at_singular = self.graph.singular[self.seams.vertex]
+        at_singular = self.graph.nodes[self.seams.vertex]
         values[at_singular] = np.rint(values[at_singular].real) + 1j * np.rint(values[at_singular].imag)
         return SeamlessMap(self.frames, self.graph, self.seams, values, self.relative_areas(values))
 
@@ -127,25 +165,29 @@ class MapProblem:
         return np.asarray(doubled / (2 * self.frames.areas * self.density.prod(1)))
 
     def _rows(self) -> tuple[sp.csr_matrix, Floats]:
-        """Four rows for every face: gradients along and across the field, of both coordinates."""
-        count = len(self.density)
-        turned = self.frames.gradients * np.exp(-1j * self.graph.angles)[:, None]
-        size = np.sqrt(self.frames.areas / self.density.prod(1))[:, None]
-        face, corner = np.repeat(np.arange(count), 3), self.seams.copies.ravel()
-        entries, right = [], np.zeros((4, count))
-        for coordinate in (0, 1):
-            along, across = (turned.real, turned.imag) if coordinate == 0 else (turned.imag, turned.real)
-            right[2 * coordinate] = size[:, 0] * self.density[:, coordinate]
-            for row, part in (
-                (2 * coordinate, along),
-                (2 * coordinate + 1, np.sqrt(self.anisotropy)[:, None] * across),
-            ):
-                for k in np.flatnonzero(self.shear[coordinate]):
-                    values = (part * size * self.shear[coordinate, k]).ravel()
-                    entries.append((row * count + face, 2 * corner + k, values))
-        rows, columns, numbers = (np.concatenate(part) for part in zip(*entries, strict=True))
-        shape = (4 * count, 2 * len(self.seams.vertex))
-        return sp.csr_matrix((numbers, (rows, columns)), shape=shape), right.ravel()
+        """Least squares of the Jacobians of all faces."""
+        faces = np.arange(len(self.density))
+        weights = np.sqrt(self.frames.areas / self.frames.areas.mean() * self.weights(faces))
+        return (sp.diags(weights.ravel()) @ self.jacobians(faces)).tocsr(), (weights * WANTED[:, None]).ravel()
+
+    def weights(self, faces: Ints) -> Floats:
+        """(4, n) of the rows of :meth:`jacobians`: those of wrong directions over those of wrong lengths."""
+        one, other = np.ones(len(faces)), self.anisotropy[faces]
+        return np.stack([one, other, other, one])
+
+    def jacobians(self, faces: Ints) -> sp.csr_matrix:
+        """(4n, 2N) gradients over those wanted: of the first coordinate along and across, then of the second."""
+        count = len(faces)
+        turned = self.frames.gradients[faces] * np.exp(-1j * self.graph.angles[faces])[:, None]
+        face, corner = np.repeat(np.arange(count), 3), self.seams.copies[faces].ravel()
+        entries = []
+        for row, coordinate in enumerate((0, 0, 1, 1)):
+            part = turned.imag if row % 2 else turned.real
+            scaled = part / self.density[faces, coordinate][:, None]
+            for k in np.flatnonzero(self.shear[coordinate]):
+                entries.append((row * count + face, 2 * corner + k, (scaled * self.shear[coordinate, k]).ravel()))
+        rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
+        return sp.csr_matrix((values, (rows, columns)), shape=(4 * count, 2 * len(self.seams.vertex)))
 
 
 def badness(found: SeamlessMap) -> tuple[int, float]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .._graph import connected
 from ..fields.frames import FaceFrames, Ints
 from .cut_graph import CutGraph
 
@@ -55,22 +54,19 @@ def translation_terms(graph: CutGraph, edge: int) -> Terms:
     return {path: 1.0 if along else -ROTATIONS[graph.quarters[edge]]}
 
 
-def find_seams(frames: FaceFrames, graph: CutGraph, preferred: dict[int, tuple[int, int]] | None = None) -> Seams:
+def find_seams(frames: FaceFrames, graph: CutGraph) -> Seams:
     """The copies of a mesh that is cut open.
 
     Args:
         frames: of the triangles.
         graph: the cut.
-        preferred: for some vertices the corner, face and number, whose copy has the value of the vertex itself.
     """
-    copies = _copies(frames, graph)
+    copies = frames.joined_corners(graph.cut)
     count = int(copies.max()) + 1
     vertex = np.zeros(count, np.int64)
     vertex[copies.ravel()] = frames.triangles.ravel()
     first = np.zeros(len(frames.points), np.int64)
     first[vertex[::-1]] = np.arange(count)[::-1]
-    for at, corner in (preferred or {}).items():
-        first[at] = copies[corner]
     unit: np.ndarray = np.ones(count, complex)
     terms: dict[int, Terms] = {}
     closures: list[tuple[int, complex, Terms]] = []
@@ -120,16 +116,6 @@ def _sum(*parts: tuple[complex, Terms]) -> Terms:
         for path, number in terms.items():
             total[path] += factor * number
     return {path: number for path, number in total.items() if number}
-
-
-def _copies(frames: FaceFrames, graph: CutGraph) -> Ints:
-    """(F, 3) corners joined over edges that are not cut."""
-    whole = ~graph.cut
-    (f, g), (i, j) = frames.faces[whole].T, frames.corners[whole].T
-    ours = np.concatenate([3 * f + i, 3 * f + (i + 1) % 3])
-    theirs = np.concatenate([3 * g + (j + 1) % 3, 3 * g + j])
-    count = 3 * len(frames.triangles)
-    return connected(np.stack([ours, theirs], 1), count).reshape(-1, 3)
 
 
 def _links(frames: FaceFrames, graph: CutGraph, copies: Ints) -> dict[int, list[Link]]:

@@ -9,7 +9,8 @@ import scipy.sparse as sp
 from scipy.optimize import minimize
 
 from ..fields.frames import Bools, Floats, Ints
-from .seamless_map import MapProblem, SeamlessMap, badness
+from .relaxation import grown
+from .seamless_map import WANTED, MapProblem, SeamlessMap, badness
 
 _RINGS = (3, 6, 12)  # around triangles turned over, tried one after the other
 _ROUNDS = 40
@@ -61,18 +62,17 @@ class _Patch:
         frames, triangles = found.frames, found.frames.triangles
         inside: Bools = np.asarray(np.isin(triangles, found.branches).any(1))
         inside[found.flips] = True
-        inside = _grown(triangles, inside, len(frames.points), rings)
+        inside = grown(triangles, inside, len(frames.points), rings)
         rim = np.zeros(len(frames.points), bool)
         rim[triangles[~inside]] = True
         faces = np.flatnonzero(inside)
-        jacobians = _jacobians(problem, faces)
+        jacobians = problem.jacobians(faces)
         copies = np.unique(problem.seams.copies[faces])
         unknowns = _movable(problem, copies, ~rim[problem.seams.vertex])
         moves = problem.split.free[:, unknowns].tocsr()
         parts = np.stack([found.values.real, found.values.imag], axis=1).ravel()
         areas = frames.areas[faces] / frames.areas[faces].mean()
-        one, other = np.ones(len(faces)), problem.anisotropy[faces]
-        weights = np.stack([one, other, other, one])
+        weights = problem.weights(faces)
         return cls(problem, parts, (jacobians @ moves).tocsr(), jacobians @ parts, areas, weights, moves)
 
     def solve(self) -> SeamlessMap:
@@ -113,33 +113,10 @@ class _Patch:
         size = (jacobian**2).sum(0) + det**2 + 1
         cofactors = np.stack([d, -c, -b, a])
         slope = 2 * jacobian / chi + cofactors * (2 * det / chi - size / (chi * root))
-        off = jacobian - np.array([1.0, 0.0, 0.0, 1.0])[:, None]
+        off = jacobian - WANTED[:, None]
         energy = self.areas @ (size / chi + _ALIGNMENT * (self.weights * off**2).sum(0))
         slope = self.areas * (slope + 2 * _ALIGNMENT * self.weights * off)
         return float(energy), np.asarray(self.slope.T @ slope.ravel())
-
-
-def _grown(triangles: Ints, inside: Bools, num_vertices: int, rings: int) -> Bools:
-    """Triangles within rings of neighbours of some."""
-    for _ in range(rings):
-        near = np.zeros(num_vertices, bool)
-        near[triangles[inside]] = True
-        inside = np.asarray(near[triangles].any(1))
-    return inside
-
-
-def _jacobians(problem: MapProblem, faces: Ints) -> sp.csr_matrix:
-    """(4n, 2N) gradients over those wanted: of the first coordinate along and across, then of the second."""
-    count = len(faces)
-    turned = problem.frames.gradients[faces] * np.exp(-1j * problem.graph.angles[faces])[:, None]
-    face, corner = np.repeat(np.arange(count), 3), problem.seams.copies[faces].ravel()
-    entries = []
-    for row, coordinate, part in ((0, 0, turned.real), (1, 0, turned.imag), (2, 1, turned.real), (3, 1, turned.imag)):
-        scaled = part / problem.density[faces, coordinate][:, None]
-        for k in np.flatnonzero(problem.shear[coordinate]):
-            entries.append((row * count + face, 2 * corner + k, (scaled * problem.shear[coordinate, k]).ravel()))
-    rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
-    return sp.csr_matrix((values, (rows, columns)), shape=(4 * count, 2 * len(problem.seams.vertex)))
 
 
 def _movable(problem: MapProblem, copies: Ints, allowed: Bools) -> Ints:

@@ -68,6 +68,16 @@ class StarClasses:
         return self.kinds == int(kind)
 
     @property
+    def bad_saddles(self) -> Tensor:
+        """(V,) bool, saddles that are not good ones."""
+        return self.is_kind(StarKind.SADDLE) & ~self.good
+
+    @property
+    def bad(self) -> Tensor:
+        """(V,) bool, stars that are neither convex nor good saddles."""
+        return self.bad_saddles | self.is_kind(StarKind.NEITHER)
+
+    @property
     def inflection_counts(self) -> Tensor:
         """(V,) number of inflection faces of every star."""
         counts = torch.zeros_like(self.kinds, dtype=torch.int64)

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from torch import Tensor
 
 from .._one_mesh import one_mesh
-from ..errors import ShapeError
 from ..reflection import Stripes, face_mirror_directions
 from ..topology import Topology
 from .camera import fit_camera
 from .captions import energy_caption
+from .common_topology import topologies_of
 from .render import MeshView
 from .shading import shade_faces, stripe_colors, stripe_frequency
 from .sheet import CAPTION, GAP, MARGIN, Sheet
@@ -53,7 +53,7 @@ def picture_before_after(
         ShapeError: if positions are not one mesh that fits the topology.
         MeshFileError: if the file cannot be written.
     """
-    topologies = two_topologies(topology)
+    topologies = topologies_of(2, topology)
     before, after = (one_mesh(v, t) for v, t in zip((before, after), topologies, strict=True))
     towards_eye, up = view or view_direction(before, topologies[0])
     panel = (width - 2 * MARGIN - GAP) // 2
@@ -77,16 +77,3 @@ def picture_before_after(
         colors = stripe_colors(stripes(mirrored[column])[:, 0])
         sheet.image(mesh.paint(colors, edges=outline(mesh)), left, sheet.top + row + CAPTION)
     return sheet.write(path, overwrite=overwrite)
-
-
-def two_topologies(topology: Topology | Sequence[Topology]) -> tuple[Topology, Topology]:
-    """Of a mesh before and after.
-
-    Raises:
-        ShapeError: if they are neither one nor two.
-    """
-    if isinstance(topology, Topology):
-        return topology, topology
-    if len(topology) != 2:
-        raise ShapeError("topology", "one of both meshes, or one for each", f"{len(topology)} topologies")
-    return topology[0], topology[1]

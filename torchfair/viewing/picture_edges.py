@@ -15,6 +15,7 @@ from ..topology import Topology
 from .camera import fit_camera
 from .captions import energy_caption
 from .color_scale import BAR, ColorScale
+from .common_topology import topologies_of
 from .lines import EdgeStyle
 from .render import MeshView
 from .shading import shade_faces
@@ -58,9 +59,9 @@ def picture_edges(
         ShapeError: if there are no meshes, or positions are not one mesh that fits the topology.
         MeshFileError: if the file cannot be written.
     """
-    topologies = [topology] * len(meshes) if isinstance(topology, Topology) else list(topology)
-    if not meshes or len(topologies) != len(meshes):
-        raise ShapeError("meshes", "at least one, and one topology for each", f"{len(meshes)} and {len(topologies)}")
+    if not meshes:
+        raise ShapeError("meshes", "at least one", "none")
+    topologies = topologies_of(len(meshes), topology)
     vertices = [one_mesh(v, t) for v, t in zip(meshes.values(), topologies, strict=True)]
     values = [angle_variation_per_edge(v, t) for v, t in zip(vertices, topologies, strict=True)]
     scale = ColorScale.of(torch.cat(values), r"$\ell\,|\alpha|$", color_map="magma_r", lightest=_LIGHTEST)

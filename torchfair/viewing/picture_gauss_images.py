@@ -11,7 +11,7 @@ from torch import Tensor
 from .._one_mesh import one_mesh
 from ..geometry import GaussImage, face_area_vectors, gauss_image
 from ..topology import Topology
-from .picture_before_after import two_topologies
+from .common_topology import topologies_of
 from .sheet import CAPTION, GAP, MARGIN, Sheet, points
 from .sphere import draw_arcs, draw_points, draw_sphere, fit_sphere_view
 from .view_direction import view_direction
@@ -49,7 +49,7 @@ def picture_gauss_images(
         ShapeError: if positions are not one mesh that fits the topology.
         MeshFileError: if the file cannot be written.
     """
-    first, second = two_topologies(topology)
+    first, second = topologies_of(2, topology)
     before, after = one_mesh(before, first), one_mesh(after, second)
     images = gauss_image(before, first), gauss_image(after, second)
     towards_eye, up = viewpoint(before, first)

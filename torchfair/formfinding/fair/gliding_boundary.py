@@ -1,4 +1,4 @@
-"""The boundary of a mesh that glides on smooth curves through its own vertices."""
+"""Boundary and creases of a mesh that glide on smooth curves through its own vertices."""
 
 from __future__ import annotations
 
@@ -6,33 +6,31 @@ import torch
 from torch import Tensor
 
 from ...projection.layout import State
-from ...topology import Topology
 from ..boundary_curves import BoundaryCurves
 from ..job.pulls import Pulls
 
 
 class GlidingBoundary:
-    """Smooth curves along the boundary of a mesh, and the vertices that glide on them.
+    """Smooth curves along boundary and creases of a mesh, and the vertices that glide on them.
 
     Corners and handles do not glide. In the mesh of a state gliding vertices are put on their curves exactly; a term
     that weighs their distance leaves them beside, by a thousandth of an edge or less.
 
     Args:
-        topology: Connectivity.
+        held: (V,) bool, vertices that glide and corners that stay: the curves hold them, not the surface.
         rim: The curves, and which vertex is on which.
         pulls: Vertices that are pulled elsewhere do not glide meanwhile.
-        planar_faces: (n,) faces that are kept planar, which asks for more digits than that: in the mesh of a state
-            their vertices are where the state has them.
+        loose: (n,) vertices of faces that are kept planar, which asks for more digits than that: in the mesh of a state
+            they are where the state has them.
 
     Attributes:
-        held: (V,) bool, vertices that glide and corners that stay: the curves hold them, not the surface.
+        held: As given.
         feet: Closest points of gliding vertices on their curves; None where nothing glides.
     """
 
-    def __init__(self, topology: Topology, rim: BoundaryCurves, pulls: Pulls, planar_faces: Tensor) -> None:
-        self._pulls, self.held = pulls, topology.is_boundary_vertex
+    def __init__(self, held: Tensor, rim: BoundaryCurves, pulls: Pulls, loose: Tensor) -> None:
+        self._pulls, self.held = pulls, held
         chosen = torch.nonzero(rim.owners >= 0).squeeze(1)
-        loose = topology.corners[torch.isin(topology.corner_faces, planar_faces)]
         self._loose = torch.isin(chosen, loose)[:, None]
         self.feet = rim.feet()
 

@@ -23,16 +23,17 @@ _KEPT_ANGLE = 0.5  # of the smallest angle of the coarse mesh
 def refined(recipe: FairRecipe, vertices: Tensor) -> FairRecipe:
     """The job on the mesh (V, 3) refined by Loop's scheme for triangles and Catmull and Clark's for others.
 
-    Reference surface and boundary curves are those of the input. Handles and held vertices keep their places, and parts
-    of planar faces and of flat panels are to be planar and flat again.
+    Reference surface and the curves along boundary and creases are those of the input. Handles and held vertices keep
+    their places, and parts of planar faces and of flat panels are to be planar and flat again.
     """
     topology, pulls = recipe.topology, recipe.pulls
-    step = hybrid(topology, boundary="interpolate", corners=recipe.rim.corners)
+    step = hybrid(topology, boundary="interpolate", corners=recipe.rim.rim.corners)
     rim, start = recipe.rim.refined(step), step.apply(vertices)
-    chosen = torch.nonzero(pulls.pulled | pulls.held).squeeze(1)
+    away = pulls.pulled | pulls.held
+    chosen = torch.nonzero(away | recipe.rim.on_creases).squeeze(1)
     start[chosen] = vertices[chosen]
-    if recipe.settings.boundary != "free":
-        start = rim.nearest(start, _between_gliding(step, pulls.pulled | pulls.held))
+    curves = rim.curves(boundary=recipe.settings.boundary != "free")
+    start = curves.nearest(start, _between_gliding(step, away))
     start = _unfolded(start, vertices, step)
     finer = type(recipe)(
         start,
@@ -41,6 +42,7 @@ def refined(recipe: FairRecipe, vertices: Tensor) -> FairRecipe:
         settings=_carried(step, recipe.problem, recipe.settings),
         rim=rim,
         input_edge=recipe.input_edge,
+        near_input=recipe.problem.near_input,
     )
     finer.pull(recipe.handles)
     finer.pulls.hold(torch.nonzero(pulls.held).squeeze(1))

@@ -40,7 +40,7 @@ class DraggedPlan(FormPlan):
         start = self._start
         pulls.aim(0.0, start)
         yield from self._from_afar()
-        moves = min(_MOST_DRAGS, max(1, math.ceil(float(pulls.away(start).max()) / _LONGEST_DRAG)))
+        moves = min(_MOST_DRAGS, max(1, math.ceil(pulls.farthest(start) / _LONGEST_DRAG)))
         for move in range(1, moves + 1):
             pulls.aim(move / moves, start)
             stage = follower.stage(follower.predicted(self.state))
@@ -75,7 +75,7 @@ class SeveralStarts(Plan):
         for start in self._starts:
             yield from self._carried_out(start.name, FormPlan(self._problem, _state(start), nearby=False))
         pulls, first = self._problem.pulls, self._starts[0]
-        if pulls.vertices.numel() and float(pulls.away(first.vertices).max()) > FAR:
+        if pulls.farthest(first.vertices) > FAR:
             yield from self._carried_out("handles dragged", DraggedPlan(self._problem, _state(first), nearby=True))
         self._say()
 
@@ -102,7 +102,7 @@ class SeveralStarts(Plan):
         problem, vertices = self._problem, state["vertices"]
         grade, fault = self._grade(vertices)
         worth = problem.curvature_and_pulls(vertices)
-        if grade == _FOLDED:  # C means nothing there
+        if grade:  # C means little there
             worth += float(normal_variation(vertices, problem.topology))
         curvature = problem.length * float(total_absolute_curvature(vertices, problem.topology))
         self.found.append((name + fault, curvature))
@@ -112,7 +112,7 @@ class SeveralStarts(Plan):
 
     def _grade(self, vertices: Tensor) -> tuple[int, str]:
         problem = self._problem
-        if bool((problem.pulls.away(vertices) > HANDLE_REACHED).any()):
+        if problem.pulls.farthest(vertices) > HANDLE_REACHED:
             return _FOLDED, " (misses handles)"
         if not all(promise.holds for promise in fold_promises(fold_measures(vertices, problem.topology))):
             return _FOLDED, " (folded)"

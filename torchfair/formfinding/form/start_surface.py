@@ -9,6 +9,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from ...boundary import boundary_turning
 from ...curves import ClosedCurve
 from ...errors import MeshError
 from ...geometry import corner_angles, dihedral_angles, face_area_vectors
@@ -31,7 +32,7 @@ class _Start(NamedTuple):
 
 
 def start_surface(curves: Sequence[ClosedCurve], count: int = 1000) -> tuple[Tensor, Topology]:
-    """A triangle mesh of about ``count`` vertices between given boundary curves, without folds.
+    """A triangle mesh of about ``count`` vertices between given boundary curves, without folds where that can be.
 
     Regular triangles where they do: in one curve a disk around a centre, all inner vertices of valence 6; between two
     an annulus of staggered rows, the second curve either way round. Where faces of these would turn over, be flat, or
@@ -40,7 +41,9 @@ def start_surface(curves: Sequence[ClosedCurve], count: int = 1000) -> tuple[Ten
     between points of the rim (one curve); on the band of least area (two); on the convex hull (several). Boundary
     vertices are evenly spaced, more closely where the rim is narrow, corners among them.
 
-    No angle is below 15 degrees, unless a corner of a rim is.
+    No angle is below 15 degrees, or half the sharpest corner of a rim, where a way is found to that; otherwise it is
+    the best that is found. That may run through itself, as where a rim is a knot: see
+    :func:`~torchfair.self_intersections.self_intersections`; jobs that start from it say so.
 
     Args:
         curves: Closed curves that do not meet.
@@ -99,7 +102,8 @@ def _oriented(patch: Patch) -> Topology:
 def _worth(start: _Start, count: int) -> float:
     """At least 1 for a start that will do, less for others, the less the worse."""
     vertices, topology, regular = start
-    wanted = min(_LEAST_ANGLE, 0.5 * _sharpest_corner(vertices, topology))
+    sharpest = math.pi - float(boundary_turning(vertices, topology).max())  # no triangle there has a larger angle
+    wanted = min(_LEAST_ANGLE, 0.5 * sharpest)
     worth = min(1.0, float(corner_angles(vertices, topology).min()) / wanted)
     if regular and abs(topology.num_vertices / count - 1.0) > _COUNT:
         worth = min(worth, 0.9)
@@ -114,14 +118,3 @@ def _seen_from_one_side(vertices: Tensor, topology: Topology) -> bool:
     """Whether no face of a disk turns over as it is seen along its area vector: then none meets another one."""
     areas = face_area_vectors(vertices, topology)
     return len(topology.boundary_loops()) == 1 and bool((areas @ areas.sum(0) > 0.0).all())
-
-
-def _sharpest_corner(vertices: Tensor, topology: Topology) -> float:
-    """The smallest angle between two boundary edges, radians: no triangle there has a larger one."""
-    result = math.pi
-    for loop in topology.boundary_loops():
-        place = vertices[loop]
-        ahead, back = place.roll(-1, 0) - place, place.roll(1, 0) - place
-        sine = torch.linalg.vector_norm(torch.linalg.cross(ahead, back), dim=1)
-        result = min(result, float(torch.atan2(sine, (ahead * back).sum(1)).min()))
-    return result

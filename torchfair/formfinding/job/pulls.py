@@ -78,6 +78,11 @@ class Pulls:
         distances: Tensor = torch.linalg.vector_norm(vertices[chosen] - self.targets[chosen], dim=1)
         return distances
 
+    def farthest(self, vertices: Tensor) -> float:
+        """Largest distance of pulled ``vertices`` (V, 3) from their targets; 0 if none is pulled."""
+        away = self.away(vertices)
+        return float(away.max()) if away.numel() else 0.0
+
     def lag(self, vertices: Tensor) -> float:
         """Largest distance of pulled ``vertices`` (V, 3) from their aims."""
         lags = torch.linalg.vector_norm(vertices - self.aims, dim=1)

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from ..._interrupts import deferred_interrupts
 from ..._threads import threads_for
-from ...errors import MeshError, SettingsError, ShapeError
+from ...errors import MeshError, SettingsError
 from ...projection import (
     Callback,
     GuidedProjection,
@@ -28,6 +28,7 @@ from ...projection import (
 from ...projection.layout import State
 from ...projection.stopwatch import Stopwatch
 from ..stopping import interrupted, stopped
+from .compiled_problems import CompiledProblems
 from .plan import Plan, Stage
 from .recipe import Recipe
 
@@ -97,7 +98,7 @@ class Session(Generic[R]):
         recipe.pulls.everywhere = live
         self.state: State = recipe.state()
         self.runs: list[ProjectionResult] = []
-        self._problems: dict[str, tuple[object, GuidedProjection]] = {}
+        self._problems = CompiledProblems()
         self._following: _Following | None = None
         self._moved = False
 
@@ -194,7 +195,7 @@ class Session(Generic[R]):
             return known
         stage = self.recipe.follower(self.recipe.predicted(self.state))
         stage = replace(stage, settings=replace(stage.settings, max_iterations=_ENDLESS, when_settled="stop"))
-        problem = self._compiled(stage)
+        problem = self._problems.of(stage)
         if known is None:
             state = init(problem, stage.blocks, replace(stage.settings, solver="auto"))
         else:
@@ -266,7 +267,7 @@ class Session(Generic[R]):
         limit, settings = self.recipe.settings.projection.time_limit, stage.settings
         if limit is not None:
             settings = replace(settings, time_limit=max(0.0, limit - watch.elapsed))
-        return self._compiled(stage).solve(
+        return self._problems.of(stage).solve(
             stage.blocks,
             settings=replace(settings, solver="auto"),
             callback=self.callback,
@@ -279,46 +280,24 @@ class Session(Generic[R]):
         late = run.status is Status.TIME_LIMIT or (limit is not None and watch.elapsed > limit)
         return stopped(run) or late
 
-    # ---- compiled problems -----------------------------------------------------------------------------
-
-    def _compiled(self, stage: Stage) -> GuidedProjection:
-        """The problem of a stage, with the index maps and the analysis of the last one of its name.
-
-        Made anew where terms have come or gone, as with a weight that was zero.
-        """
-        version, problem = self._problems.get(stage.name, (None, None))
-        if problem is not None and not stage.anew and version != stage.version:
-            try:
-                problem = problem.with_terms(stage.terms())
-            except ShapeError:  # other stencils; what is wrong with the terms is an error below, too
-                problem = None
-        if problem is None or stage.anew:
-            problem = GuidedProjection(stage.blocks, stage.terms(), fixed=stage.fixed, solver=stage.settings.solver)
-        else:
-            problem = problem.with_fixed(stage.fixed)
-        self._problems[stage.name] = (stage.version, problem)
-        return problem
+    # ---- snapshots -------------------------------------------------------------------------------------
 
     def forget_compiled(self) -> None:
         """Compiles anew from now on: what was interrupted while it searched or factorised may not be whole."""
-        self._problems = {}
+        self._problems.clear()
         self._following = None
         self.recipe.forget()
-
-    # ---- snapshots -------------------------------------------------------------------------------------
 
     def snapshot(self) -> Snapshot:
         """Everything that steering and solving may change; shares nothing with the session that can change."""
         recipe = self.recipe
-        solvers = {name: copy.copy(problem.solver) for name, (_, problem) in self._problems.items()}
         return Snapshot(
             {name: block.clone() for name, block in self.state.items()},
             recipe.pulls.copy(),
             recipe.settings,
             recipe.snapshot(),
             list(self.runs),
-            dict(self._problems),
-            solvers,
+            self._problems.snapshot(),
             copy.copy(self._following),
             self._moved,
         )
@@ -332,9 +311,7 @@ class Session(Generic[R]):
         self.recipe.pulls.version = snapshot.pulls.version
         snapshot.of_recipe()
         self.runs = list(snapshot.runs)
-        self._problems = dict(snapshot.problems)
-        for name, (_, problem) in self._problems.items():
-            problem.solver = copy.copy(snapshot.solvers[name])
+        snapshot.of_problems()
         self._following, self._moved = copy.copy(snapshot.following), snapshot.moved
 
     def refined(self) -> Session[R]:
@@ -356,8 +333,7 @@ class Snapshot:
     settings: Any
     of_recipe: Callable[[], None]
     runs: list[ProjectionResult]
-    problems: dict[str, tuple[object, GuidedProjection]]
-    solvers: dict[str, Any]
+    of_problems: Callable[[], None]
     following: _Following | None
     moved: bool
 

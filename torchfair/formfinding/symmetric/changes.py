@@ -44,14 +44,13 @@ class Changes:
         away = self._surface.closest(vertices).distances
         same = torch.equal(vertices, self._start)
         classes = self._classes if same else classify_stars(vertices, self._topology)
-        saddle = classes.is_kind(StarKind.SADDLE)
         return {
             "largest_displacement": float(moved.max()),
             "mean_displacement": float(moved.mean()),
             "largest_distance_from_start": float(away.max() / edge_lengths(self._start, self._topology).mean()),
             "convex_stars": float(classes.is_kind(StarKind.CONVEX).sum()),
-            "good_saddles": float((saddle & classes.good).sum()),
-            "bad_saddles": float((saddle & ~classes.good).sum()),
+            "good_saddles": float(classes.good.sum()),
+            "bad_saddles": float(classes.bad_saddles.sum()),
             "neither_stars": float(classes.is_kind(StarKind.NEITHER).sum()),
             "changed_stars": float((_kinds(classes) != _kinds(self._classes)).sum()),
         }

@@ -142,8 +142,7 @@ class SymmetricPlan(Plan):
 
     def _farthest(self) -> float:
         """Largest distance of a handle from its target."""
-        away = self._problem.pulls.away(self.state["vertices"])
-        return float(away.max()) if away.numel() else 0.0
+        return self._problem.pulls.farthest(self.state["vertices"])
 
     def _is_right(self, found: Score | None = None) -> bool:
         return (found or self._score()) == (self._problem.settings.tolerance, 0, 0.0)

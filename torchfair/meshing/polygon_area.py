@@ -1,0 +1,19 @@
+"""Area vectors of single polygons."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..fields.frames import Floats
+
+
+def area_vector(positions: Floats, face: list[int]) -> Floats:
+    """Of a polygon: its normal, as long as its area; as exact far from the origin as near it.
+
+    Args:
+        positions: (V, 3).
+        face: vertices counterclockwise.
+    """
+    x, y, z = (positions[face] - positions[face[0]]).T
+    a, b, c = np.roll(x, -1), np.roll(y, -1), np.roll(z, -1)
+    return np.array([y @ c - z @ b, z @ a - x @ c, x @ b - y @ a]) / 2
