@@ -19,9 +19,8 @@ if TYPE_CHECKING:
 
 
 _FEW_EXCEPTIONS = 0.1  # share of regular vertices at which marks of INPUT may not fit together
-_MOST_SLIDE = (
-    1.4  # edges; lattices of 10 and 20 rows, turned on six surfaces, were met up to 1.36 and missed from 1.45 on
-)
+_MOST_SLIDE = 1.4
+"""Edges. Turned lattices of 10 and 20 rows on six surfaces were met up to 1.36 and mostly missed from 1.45 on."""
 
 _OPTIONS = {
     "allow_exceptions=True": "--allow-exceptions",
