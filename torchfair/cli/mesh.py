@@ -31,7 +31,8 @@ _DESCRIPTION = (
     "Makes a mesh of a surface whose edges follow its principal curvature lines: quads, which are then nearly planar "
     "and have the least E of all, or a half-shifted lattice of triangles, from which 'torchfair symmetric' starts. "
     "Vertices lie on a smooth surface through those given; sharp edges and corners of the boundary stay, and what of "
-    "them and the boundary follows a direction becomes lines of the mesh. The topology is that of the surface, or nothing is written."
+    "them and the boundary follows a direction becomes lines of the mesh. The topology is that of the surface, or "
+    "nothing is written."
 )
 _ROWS = {
     "faces": "faces",
