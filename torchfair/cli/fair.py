@@ -84,13 +84,13 @@ class FairCommand(JobCommand):
 
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""
+        mesh = read_input(arguments.input, arguments)
         options = {
             "reference": read_reference(arguments),
-            "handles": read_handles(arguments),
+            "handles": read_handles(arguments, mesh),
             "levels": arguments.levels,
         }
-        mesh = read_input(arguments.input, arguments.repair)
-        options["fixed"] = read_fixed(arguments, mesh.vertices, mesh.topology)
+        options["fixed"] = read_fixed(arguments, mesh)
         marks, notes = read_marks(mesh, arguments)
         return Request(mesh, options, notes=notes, marks=marks)
 

@@ -85,7 +85,7 @@ class FormCommand(JobCommand):
         options = {
             "curves": start.curves or None,
             "normals": start.normals,
-            "handles": read_handles(arguments) | start.nearest(arguments.through),
+            "handles": read_handles(arguments, start.mesh) | start.nearest(arguments.through),
             "levels": arguments.levels,
             "remesh": arguments.remesh or arguments.input is None,
             "starts": arguments.starts or (_STARTS if arguments.input is None else 1),

@@ -11,8 +11,9 @@ from ..io.json_text import to_json
 from .arguments import count, positive_count, positive_or_none
 from .errors import CommandError
 from .exit_codes import EXIT_NOT_REACHED, EXIT_OK
-from .inputs import read_input
+from .inputs import add_repair, read_input
 from .outputs import refuse_existing
+from .reading import said_of
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
@@ -58,7 +59,7 @@ def add_parser(subparsers: Any) -> None:
     add("--frames", type=count, default=36, metavar="N", help="pictures of the turntable, 0 for none (default 36)")
     add("--no-pictures", action="store_true", help="write no pictures and no turntable")
     add("--force", action="store_true", help="replace files that exist")
-    add("--repair", action="store_true", help="orient faces consistently and drop unused vertices first")
+    add_repair(parser)
     parser.set_defaults(run=run, name=NAME)
 
 
@@ -69,8 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     files = _files(arguments)
     if arguments.size < _LEAST_SIZE:
         raise CommandError(f"--size {arguments.size}: pictures need at least {_LEAST_SIZE} pixels to be compared")
-    mesh = read_input(arguments.input, arguments.repair)
-    reference = read_input(arguments.reference, arguments.repair) if arguments.reference else None
+    mesh = read_input(arguments.input, arguments)
+    reference = read_input(arguments.reference, arguments) if arguments.reference else None
     with threads_for(0, mesh.vertices.device):  # pictures of this size are made of very short operations
         score = _score(mesh, reference, arguments)
         report: dict[str, Any] = dict(score.numbers())
@@ -78,14 +79,15 @@ def run(arguments: argparse.Namespace) -> int:
             "file": arguments.input,
             "reference": arguments.reference,
             "repairs": list(mesh.repairs),
+            "notes": list(mesh.notes),
         }
         if files:
             write(files, mesh, score, report, arguments)
     if arguments.json:
         sys.stdout.write(to_json(report))
         return _ended(report)
-    for sentence in mesh.repairs:
-        print(f"repaired: {sentence}")
+    for line in [*said_of(mesh), *(said_of(reference, arguments.reference) if reference else [])]:
+        print(line)
     print(f"{arguments.input}\n{format_numbers(report)}")
     print("".join(f"wrote {path}\n" for path in files), end="")
     return _ended(report)

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from .._graph import face_components
-from .._half_edges import first_few
+from .._names import PlacedError, few, first_few
 from .._one_mesh import one_mesh
 from ..errors import MeshError
 from ..fields import Directions, FaceFrames, carried_directions, directions_of
@@ -92,7 +92,8 @@ def components_of(vertices: Tensor, topology: Topology, crease_angle: float = 0.
         raise MeshError(f"vertices: not finite numbers: {first_few(wrong, len(wrong))}")
     flat = torch.nonzero(degenerate_faces(points, topology)).squeeze(1).tolist()
     if flat:
-        raise MeshError(f"{len(flat)} face(s) have no area: faces {first_few(flat, len(flat))}. Remove or remesh them.")
+        words = ". torchfair.repair_mesh (--repair) drops them; or remesh them."
+        raise PlacedError(f"{len(flat)} face(s) have no area: faces ", few("face", flat), words)
     triangles = triangulate(points, topology).triangles
     whole = Topology.from_faces(triangles, topology.num_vertices)
     labels = face_components(whole)

@@ -167,7 +167,7 @@ class FormRecipe(Recipe[FormSettings]):
         """With even triangles, if they may be replaced; boundary vertices, handles and held ones keep their places."""
         if not self._remesh:
             return None
-        vertices, pulls = self.vertices(state), self.pulls
+        pulls, vertices = self.pulls, self.vertices(state)
         try:
             even = even_mesh(vertices, self.topology, pulls.pulled | pulls.held, self.topology.num_vertices)
             rim = self.rim._replace(track=self.rim.track.updated(vertices)) if self.problem.glides else self.rim
