@@ -29,8 +29,8 @@ NAME = "torchfair mesh"
 _DESCRIPTION = (
     "Makes a mesh of a surface whose edges follow its principal curvature lines: quads, which are then nearly planar "
     "and have the least E of all, or a half-shifted lattice of triangles, from which 'torchfair symmetric' starts. "
-    "Vertices lie on a smooth surface through those given; corners of the boundary stay, and parts of it that follow a direction become lines "
-    "of the mesh. The topology is that of the surface, or nothing is written."
+    "Vertices lie on a smooth surface through those given; corners of the boundary stay, and parts of it that follow "
+    "a direction become lines of the mesh. The topology is that of the surface, or nothing is written."
 )
 _ROWS = {
     "faces": "faces",

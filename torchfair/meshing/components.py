@@ -218,8 +218,8 @@ def on_surface(pieces: Pieces, surface: ReadSurface, settings: MeshingSettings) 
     if not settings.curved:
         return pieces
     moved = surface.curved(torch.cat([torch.from_numpy(pieces.positions), pieces.places]))
-    positions, places = moved.split([len(pieces.positions), len(pieces.places)])
-    return replace(pieces, positions=positions.numpy(), places=places)
+    count = len(pieces.positions)
+    return replace(pieces, positions=moved[:count].numpy(), places=moved[count:])
 
 
 def _name(number: int, count: int) -> str:
