@@ -52,7 +52,7 @@ def _collapse_short(edits: PolygonEdits, limit: float) -> int:
 def _join_small(edits: PolygonEdits, limit: float) -> int:
     """Joins faces below an area with the neighbour across their longest side, or collapses their shortest."""
     done = 0
-    for number in edits.boundary_faces():
+    for number in sorted(edits.boundary_faces(), key=edits.area):
         if number not in edits.faces or edits.area(number) >= limit:
             continue
         sides = sorted(edits.sides(number), key=edits.length)
