@@ -1,6 +1,6 @@
-"""Draws the picture of the page on meshing, docs/images/meshing_stages.png: ``python docs/meshing_sheet.py``.
+"""Draws the pictures of the page on meshing, docs/images/meshing_*.png: ``python docs/meshing_sheet.py``.
 
-With a folder as argument the picture goes there.
+With a folder as argument the pictures go there.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import torch
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.meshing import principal_quads, principal_triangles
-from torchfair.shapes import FreeFormPatch, irregular_triangles
+from torchfair.meshing import MeshingSettings, principal_quads, principal_triangles
+from torchfair.shapes import FreeFormPatch, Hyperboloid, irregular_triangles
 from torchfair.viewing import MeshView, fit_camera, view_direction
 from torchfair.viewing.lines import EdgeStyle
 from torchfair.viewing.shading import shade_faces
@@ -23,15 +23,24 @@ from torchfair.viewing.wireframe import quiet_edges
 IMAGES = Path(__file__).resolve().parent / "images"
 CELL, HEIGHT = 520, 420
 
+Panel = tuple[Tensor, Topology, Tensor | None]
+"""Vertices, topology and marked edges."""
+
 
 def main() -> None:
-    """Writes the picture."""
+    """Writes the pictures."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES
+    draw(folder / "meshing_stages.png", stages())
+    draw(folder / "meshing_adaptive.png", spacings())
+
+
+def stages() -> dict[str, Panel]:
+    """A surface, its quads and its triangles."""
     surface = irregular_triangles(FreeFormPatch(), 2500)
     vertices, topology = surface.vertices, surface.topology
     quads = principal_quads(vertices, topology, count=400)
     lattice = principal_triangles(vertices, topology, count=800)
-    panels: dict[str, tuple[Tensor, Topology, Tensor | None]] = {
+    return {
         "design surface": (vertices, topology, None),
         f"principal quads, E/C = {quads.report['variation_over_curvature']:.2f}": (
             quads.vertices,
@@ -44,6 +53,22 @@ def main() -> None:
             lattice.principal.mask,
         ),
     }
+
+
+def spacings() -> dict[str, Panel]:
+    """A surface that flares, with quads of one length and of lengths that follow curvature."""
+    surface = irregular_triangles(Hyperboloid(0.5, 1.2, heights=(-0.6, 2.0)), 2500)
+    panels: dict[str, Panel] = {}
+    for words, settings in (("uniform", MeshingSettings()), ("adaptive", MeshingSettings(adaptive=True))):
+        quads = principal_quads(surface.vertices, surface.topology, count=500, settings=settings)
+        off = quads.report["distance_max"] * quads.report["mean_edge"]
+        panels[f"{words}: {quads.report['faces']} quads, at most {off:.4f} off"] = quads.vertices, quads.topology, None
+    return panels
+
+
+def draw(path: Path, panels: dict[str, Panel]) -> None:
+    """Writes meshes side by side, seen as the first one is seen best."""
+    vertices, topology, _ = next(iter(panels.values()))
     view = view_direction(vertices, topology)
     camera, size = fit_camera(vertices, towards_eye=view.towards_eye, up=view.up, width=CELL - 24, height=HEIGHT)
     sheet = Sheet(2 * MARGIN + len(panels) * CELL, 2 * MARGIN + HEIGHT + CAPTION)
@@ -57,7 +82,7 @@ def main() -> None:
         painted = picture.paint(shade_faces(points, connectivity, camera), edges=edges)
         sheet.image(painted, left + 12, MARGIN)
         sheet.text(words, left + CELL / 2, MARGIN + HEIGHT + CAPTION / 2, 21, ha="center", va="center")
-    sheet.write(folder / "meshing_stages.png", overwrite=True)
+    sheet.write(path, overwrite=True)
 
 
 if __name__ == "__main__":

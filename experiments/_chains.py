@@ -65,7 +65,7 @@ def words_of(row: Report) -> list[str]:
     flat = row["planarity_max"] < 1e-9
     return [
         f"$E$ = {row['normal_variation']:.2f} = {row['variation_over_curvature']:.2f} $C$",
-        "plane faces" if flat else f"planarity at most {row['planarity_max']:.0e}",
+        "plane faces" if flat else f"planarity at most {row['planarity_max']:.1g}",
     ]
 
 

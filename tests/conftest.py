@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -11,6 +12,9 @@ from pretended_device import PRETENDED, PretendedDevice
 
 settings.register_profile("torchfair", deadline=None)  # how long an example takes says more about the machine
 settings.load_profile("torchfair")
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as shells set it for jobs in the background: tests press Ctrl-C
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

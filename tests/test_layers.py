@@ -11,8 +11,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 FLOORS = (
     {"errors", "_interrupts", "_shown", "_threads"},
-    {"_half_edges", "_numbers", "_ranges", "cameras", "linear", "progress", "rasterisation"},
-    {"settings"},
+    {"_names", "_numbers", "_ranges", "cameras", "linear", "progress", "rasterisation"},
+    {"_half_edges", "settings"},
     {"_connectivity", "projection"},
     {"topology"},
     {"_graph"},

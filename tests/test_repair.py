@@ -1,4 +1,4 @@
-"""Repair turns over as few faces as possible, drops unused vertices, and does nothing else."""
+"""Repair turns over as few faces as possible, drops unused vertices, and leaves alone what is right."""
 
 from __future__ import annotations
 
@@ -128,10 +128,7 @@ def test_only_the_one_sided_part_is_blamed() -> None:
 @pytest.mark.parametrize(
     ("faces", "message"),
     [
-        ([[0, 1, 2], [3, 4, 5], [1, 2, 0]], r"1 face\(s\) occur twice: faces 0 and 2"),
         ([[0, 1, 2], [0, 1, 3], [1, 0, 4]], "non-manifold: .* more than two faces"),
-        ([[0, 1, 2], [0, 3, 4]], "more than one fan"),
-        ([[0, 1, 1]], "more than once"),
         ([[0, 1]], "fewer than three corners"),
         ([[0, 1, 6]], "out of range"),
     ],

@@ -14,9 +14,7 @@ from ._half_edges import Ints as Ints
 from ._half_edges import build_half_edges as build_half_edges
 from ._half_edges import first_few as first_few
 from ._half_edges import pack_faces as pack_faces
-from .errors import MeshError
-
-_REPAIR_HINT = "torchfair.repair_mesh re-orients faces that can be oriented consistently"
+from ._names import Part, PlacedError, few, few_groups
 
 
 @dataclass(frozen=True)
@@ -72,28 +70,38 @@ def _check_orientation(half: HalfEdges, first: Ints, second: Ints) -> None:
     clash = np.flatnonzero(half.corners[first] == half.corners[second])
     if clash.size:
         named = (
-            f"faces {half.faces[a]} and {half.faces[b]} along edge ({half.corners[a]}, {half.corners[half.next[a]]})"
+            [*_two_faces(half, a, b), " along edge ", *edge_parts(half, int(a))]
             for a, b in zip(first[clash], second[clash], strict=True)
         )
-        raise MeshError(
-            f"inconsistent orientation: {clash.size} edge(s) are traversed twice in the same direction: "
-            f"{first_few(named, clash.size)}. {_REPAIR_HINT}."
+        raise PlacedError(
+            f"inconsistent orientation: {clash.size} edge(s) are traversed twice in the same direction: ",
+            few_groups(named, clash.size),
+            ". torchfair.repair_mesh re-orients faces that can be oriented consistently.",
         )
+
+
+def _two_faces(half: HalfEdges, a: int, b: int) -> list[Part]:
+    return ["faces ", ("face", int(half.faces[a])), " and ", ("face", int(half.faces[b]))]
+
+
+def edge_parts(half: HalfEdges, corner: int) -> list[Part]:
+    """The edge from a corner on, as it is called in a sentence."""
+    return ["(", ("vertex", int(half.corners[corner])), ", ", ("vertex", int(half.heads[corner])), ")"]
 
 
 def _check_manifold_edges(half: HalfEdges, order: Ints, starts: Ints, counts: Ints) -> None:
     crowded = np.flatnonzero(counts > 2)
     if crowded.size:
 
-        def describe(c: int) -> str:
-            around = half.faces[order[starts[c] : starts[c] + counts[c]]]
-            h = order[starts[c]]
-            return f"edge ({half.corners[h]}, {half.heads[h]}) of faces {sorted(around.tolist())}"
+        def describe(c: int) -> list[Part]:
+            around = np.sort(half.faces[order[starts[c] : starts[c] + counts[c]]])
+            edge = edge_parts(half, int(order[starts[c]]))
+            return ["edge ", *edge, " of faces [", *few("face", around), "]"]
 
-        raise MeshError(
-            f"non-manifold: {crowded.size} edge(s) have more than two faces: "
-            f"{first_few((describe(int(c)) for c in crowded), crowded.size)}. "
-            "Remove the extra faces or duplicate the vertices of the edge."
+        raise PlacedError(
+            f"non-manifold: {crowded.size} edge(s) have more than two faces: ",
+            few_groups((describe(int(c)) for c in crowded), crowded.size),
+            ". Remove the extra faces, or torchfair.repair_mesh(..., split_edges=True) duplicates vertices.",
         )
 
 
@@ -116,9 +124,10 @@ def build_rings(half: HalfEdges, edges: Edges) -> tuple[Ints, Ints]:
     used = np.flatnonzero(start >= 0)
     split = used[remaining[start[used]] + 1 != degree[used]]
     if split.size:  # the chain from the start misses some faces
-        raise MeshError(
-            f"non-manifold: the faces around {split.size} vertex(es) form more than one fan: "
-            f"vertices {first_few(split, split.size)}. Duplicate such a vertex, one copy per fan."
+        raise PlacedError(
+            f"non-manifold: the faces around {split.size} vertex(es) form more than one fan: vertices ",
+            few("vertex", split),
+            ". Duplicate such a vertex, one copy per fan, as torchfair.repair_mesh does.",
         )
 
     has_boundary = np.bincount(tails[is_open], minlength=half.num_vertices)

@@ -6,25 +6,17 @@ the next corner of the same face. Arrays are indexed by half-edge unless said ot
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from ._names import Ints as Ints
+from ._names import PlacedError, few, few_groups
+from ._names import first_few as first_few
 from .errors import MeshError
 
-Ints = npt.NDArray[np.int64]
-
-_SHOWN = 5
 _MOST_VERTICES = 2**31  # keeps the products below in 64 bits and a stray huge index from eating the memory
-
-
-def first_few(items: Iterable[object], total: int) -> str:
-    """The first few items as text, followed by how many were left out."""
-    shown = [str(item) for item, _ in zip(items, range(_SHOWN), strict=False)]
-    more = f" and {total - len(shown)} more" if total > len(shown) else ""
-    return ", ".join(shown) + more
 
 
 @dataclass(frozen=True)
@@ -75,22 +67,28 @@ def pack_faces(faces: object) -> tuple[Ints, Ints]:
 
 
 def build_half_edges(corners: Ints, offsets: Ints, num_vertices: int | None) -> HalfEdges:
-    """Checks face sizes and indices, then links each corner to its neighbours in the face."""
-    sizes = np.diff(offsets)
-    small = np.flatnonzero(sizes < 3)
-    if small.size:
-        raise MeshError(
-            f"{small.size} face(s) have fewer than three corners: faces {first_few(small, small.size)}. "
-            "Remove them from the face list."
-        )
-    face_ids = np.repeat(np.arange(sizes.size, dtype=np.int64), sizes)
-    num_vertices = _count_vertices(corners, face_ids, num_vertices)
+    """Checks faces, then links each corner to its neighbours in the face."""
+    num_vertices = check_faces(corners, offsets, num_vertices)
+    face_ids = np.repeat(np.arange(offsets.size - 1, dtype=np.int64), np.diff(offsets))
     following = np.arange(1, corners.size + 1, dtype=np.int64)
     following[offsets[1:] - 1] = offsets[:-1]
     previous = np.empty_like(following)
     previous[following] = np.arange(corners.size, dtype=np.int64)
     _check_repeats(corners, face_ids, num_vertices)
     return HalfEdges(num_vertices, corners, offsets, face_ids, following, previous)
+
+
+def check_faces(corners: Ints, offsets: Ints, num_vertices: int | None) -> int:
+    """V; refuses faces of fewer than three corners and vertex numbers that do not exist."""
+    sizes = np.diff(offsets)
+    small = np.flatnonzero(sizes < 3)
+    if small.size:
+        raise PlacedError(
+            f"{small.size} face(s) have fewer than three corners: faces ",
+            few("face", small),
+            ". Remove them from the face list.",
+        )
+    return _count_vertices(corners, np.repeat(np.arange(sizes.size, dtype=np.int64), sizes), num_vertices)
 
 
 def _count_vertices(corners: Ints, face_ids: Ints, num_vertices: int | None) -> int:
@@ -101,10 +99,11 @@ def _count_vertices(corners: Ints, face_ids: Ints, num_vertices: int | None) -> 
         raise MeshError(f"num_vertices must lie between 0 and {_MOST_VERTICES}, got {num_vertices}")
     outside = np.flatnonzero((corners < 0) | (corners >= num_vertices))
     if outside.size:
-        named = (f"face {face_ids[h]} uses vertex {corners[h]}" for h in outside)
-        raise MeshError(
-            f"vertex numbers out of range 0 <= number < {num_vertices}: {first_few(named, outside.size)}. "
-            "Count vertices from zero and pass num_vertices if the last vertices are unused."
+        named = (["face ", ("face", int(face_ids[h])), f" uses vertex {corners[h]}"] for h in outside)
+        raise PlacedError(
+            f"vertex numbers out of range 0 <= number < {num_vertices}: ",
+            few_groups(named, outside.size),
+            ". Count vertices from zero and pass num_vertices if the last vertices are unused.",
         )
     return num_vertices
 
@@ -113,7 +112,8 @@ def _check_repeats(corners: Ints, face_ids: Ints, num_vertices: int) -> None:
     keys = np.sort(face_ids * max(num_vertices, 1) + corners)
     repeated = np.unique(keys[1:][keys[1:] == keys[:-1]] // max(num_vertices, 1))
     if repeated.size:
-        raise MeshError(
-            f"{repeated.size} face(s) use a vertex more than once: faces {first_few(repeated, repeated.size)}. "
-            "Remove the repeated corner, or the face if fewer than three corners remain."
+        raise PlacedError(
+            f"{repeated.size} face(s) use a vertex more than once: faces ",
+            few("face", repeated),
+            ". Remove the repeated corner, or the face if fewer than three corners remain.",
         )

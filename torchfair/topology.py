@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from . import _connectivity
+from ._names import PlacedError, few
 from .errors import MeshError, ShapeError
 
 _EAGER_TABLES = ("face_sizes", "is_triangular", "is_quadrangular", "faces_by_size", "next_corners", "valences",
@@ -255,9 +256,10 @@ class Topology:
         """Raises MeshError naming the first faces that are not triangles."""
         if not self.is_triangular:
             others = torch.nonzero(self.face_sizes != 3).squeeze(1).tolist()
-            raise MeshError(
-                f"a triangle mesh is needed, but {len(others)} face(s) are not triangles: "
-                f"faces {_connectivity.first_few(others, len(others))}. Triangulate them first."
+            raise PlacedError(
+                f"a triangle mesh is needed, but {len(others)} face(s) are not triangles: faces ",
+                few("face", others),
+                ". Triangulate them first.",
             )
 
     def check_vertices(self, vertices: Tensor) -> None:

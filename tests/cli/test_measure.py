@@ -44,7 +44,9 @@ def test_json_is_one_strict_object(tmp_path: Path, capsys: pytest.CaptureFixture
         "dihedral_angle_degrees",
         "angle_variation",
     }
-    assert set(measured["units"]) == set(measured) - {"file", "repairs", "worst_edges", "curvature_doubts", "units"}
+    assert measured["notes"] == []
+    others = {"file", "repairs", "notes", "worst_edges", "curvature_doubts", "units"}
+    assert set(measured["units"]) == set(measured) - others
     assert measured["curvature_doubts"] == []
 
 

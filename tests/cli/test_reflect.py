@@ -94,11 +94,33 @@ def test_a_mesh_that_is_not_where_its_reference_is_has_nothing_to_compare(
     save_mesh(tmp_path / "far.obj", mesh.vertices + 100, mesh.topology)
     folder = tmp_path / "out"
     options = ["--reference", str(tmp_path / "far.obj"), "-o", str(folder), *FEW_PIXELS]
-    assert main(["reflect", mesh_file, *options]) == 0
-    assert "nothing to compare" in capsys.readouterr().out
+    assert main(["reflect", mesh_file, *options]) == 1
+    said = capsys.readouterr()
+    assert "nothing to compare" in said.out
+    assert said.err.count("\n") == 1
+    assert "no score" in said.err
     report = read_json((folder / "reflection.json").read_text())
-    assert [report[key] for key in KEYS] == [0, 0, 0, 0]
+    assert [report[key] for key in KEYS] == [None] * 4
+    assert report["compared_of_mesh"] == 0
     assert len(list(folder.iterdir())) == 4
+
+
+def test_a_score_of_little_is_doubted(mesh_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A reference that lies beside the mesh but for a margin, and one that lies on it."""
+    mesh = principal_quads(SADDLE, 12, 12)
+    width = float(mesh.vertices[:, 0].max() - mesh.vertices[:, 0].min())
+    for shift, doubted in ((0.0, False), (0.7 * width, True)):
+        moved = mesh.vertices.clone()
+        moved[:, 0] += shift
+        save_mesh(tmp_path / "reference.obj", moved, mesh.topology, overwrite=True)
+        command = ["reflect", mesh_file, "--reference", str(tmp_path / "reference.obj"), "--json", "--size", "96"]
+        assert main(command) == 0
+        said = capsys.readouterr()
+        report = read_json(said.out)
+        assert ("was compared" in said.err) is doubted is (report["compared_of_mesh"] < 0.2)  # type: ignore[operator]
+        assert report["score"] > 0  # type: ignore[operator]
+        views = zip(report["score_by_view"], report["compared"], strict=True)  # type: ignore[call-overload]
+        assert all((score is None) is (part == 0) for score, part in views)
 
 
 @pytest.mark.parametrize(

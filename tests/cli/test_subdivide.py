@@ -79,7 +79,7 @@ def test_refusals(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     save_mesh(start, vertices, topology)
     assert main(["subdivide", str(start), "-o", str(tmp_path / "fine.obj"), "--scheme", "loop"]) == 2
     assert "Loop subdivision needs triangles" in error_line(capsys)
-    assert main(["subdivide", str(start), "-o", str(tmp_path / "fine.stl")]) == 2
+    assert main(["subdivide", str(start), "-o", str(tmp_path / "fine.xyz")]) == 2
     assert "choose a name that ends in .obj, .off, .ply" in error_line(capsys)
     before = start.read_bytes()
     assert main(["subdivide", str(start), "-o", str(start)]) == 2

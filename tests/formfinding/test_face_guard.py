@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import torch
 from torch import Tensor
@@ -53,3 +54,18 @@ def test_steps_that_collapse_an_angle_are_refused_on_request() -> None:
     assert FaceGuard(TOPOLOGY, lambda state: state["x"])(start, flat)
     assert FaceGuard(TOPOLOGY, lambda state: state["x"], 0.99 * smallest)(start, flat)
     assert not FaceGuard(TOPOLOGY, lambda state: state["x"], 1.01 * smallest)(start, flat)
+
+
+def test_steps_that_fold_an_edge_are_refused_on_request() -> None:
+    """The corner is turned about the diagonal, out of the plane, in steps that turn no face over."""
+
+    def folded(degrees: float) -> State:
+        angle = math.radians(degrees)
+        half = 0.5**0.5
+        return moved(1, [0.5 + 0.5 * math.cos(angle), 0.5 - 0.5 * math.cos(angle), half * math.sin(angle)])
+
+    for degrees in (100.0, 140.0, -140.0):
+        guard = FaceGuard(TOPOLOGY, lambda state: state["x"], steepest=math.radians(abs(degrees)))
+        assert guard(folded(degrees * 0.9), folded(degrees * 0.999))
+        assert not guard(folded(degrees * 0.9), folded(degrees * 1.001))
+        assert FaceGuard(TOPOLOGY, lambda state: state["x"])(folded(degrees * 0.9), folded(degrees * 1.001))

@@ -67,12 +67,19 @@ def test_stages_mix_targets_evenly_and_weights_of_planarity_by_powers() -> None:
 
 @pytest.mark.parametrize(("weight", "runs"), [(1e3, 10), (2.5e4, 9), (1e6, 8)])
 def test_planarity_is_raised_beyond_its_weight_until_faces_are_planar_at_most_twice(weight: float, runs: int) -> None:
-    """Each time by a sixth of its powers; what is planar enough is half of the deviation that the job promises."""
+    """Each time by a sixth of its powers; what is planar enough is half of the deviation that the job promises.
+
+    Where it is not what is promised even then, faces are made planar without E, and E is lowered from there.
+    """
     vertices, topology = quads()
     settings = FairSettings(planar="quads", planarity_weight=weight, continuation=())
     result = minimise_normal_variation(vertices, topology, settings=settings)
     done = [*result.preparation, result.projection]
-    assert len(done) == runs
+    assert (len(done) > runs) is (runs == 10)
+    if len(done) > runs:
+        assert all(row.name != "normal variation" for row in done[runs].residuals)
+        assert result.after["largest_planarity"] < 1e-4 < float(planarity(done[9].blocks["vertices"], topology).max())
+    done = done[:runs]
     felt = [next(row.weight for row in run.residuals if row.name == "planarity") for run in done]
     expected = [*((i + 1) / 8 for i in range(8)), 7 / 6, 8 / 6][:runs]
     assert felt == pytest.approx([weight**share for share in expected])
@@ -80,7 +87,8 @@ def test_planarity_is_raised_beyond_its_weight_until_faces_are_planar_at_most_tw
     assert all(warp > 5e-5 for warp in warps[:-1])
     assert warps == sorted(warps, reverse=True)
     assert warps[-1] <= 5e-5 or runs == 10
-    assert result.after["largest_planarity"] == pytest.approx(warps[-1], rel=1e-3)
+    if runs < 10:
+        assert result.after["largest_planarity"] == pytest.approx(warps[-1], rel=1e-3)
 
 
 @pytest.mark.parametrize("continuation", [(), (10.0,), (100.0, 5.0)])

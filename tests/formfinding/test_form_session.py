@@ -43,7 +43,12 @@ def dragged(session: Session[FormRecipe], handle: int, way: Tensor, moves: int) 
 
 
 @pytest.mark.parametrize(
-    ("way", "moves"), [(0.1 * UP, 20), (0.3 * UP, 12), (0.2 * SIDEWAYS, 20)], ids=["up", "fast", "sideways"]
+    ("way", "moves"),
+    [
+        pytest.param(0.1 * UP, 20, id="up"),
+        pytest.param(0.3 * UP, 12, id="fast", marks=pytest.mark.slow),
+        pytest.param(0.2 * SIDEWAYS, 20, id="sideways", marks=pytest.mark.slow),
+    ],
 )
 def test_a_dragged_handle_is_followed_and_comes_to_rest_where_the_whole_job_does(way: Tensor, moves: int) -> None:
     vertices, topology, handle = annulus()

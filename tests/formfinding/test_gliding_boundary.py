@@ -53,6 +53,7 @@ def problem(vertices: Tensor, topology: Topology, **settings: object) -> FairPro
     return FairProblem(vertices, topology, None, Pulls(vertices), FairSettings(**{**SMOOTH, **settings}))
 
 
+@pytest.mark.slow
 def test_the_rim_of_a_coarse_dome_glides_on_its_circle() -> None:
     vertices, topology = dome()
     result = minimise_normal_variation(vertices, topology, settings=FairSettings(crease_angle=0.0))

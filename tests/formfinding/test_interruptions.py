@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import pytest
@@ -60,11 +60,16 @@ def quads(n: int = 5) -> tuple[Tensor, Topology]:
     return vertices, Topology.from_faces(grid_faces(n, n))
 
 
+def mostly_slow(phases: Iterable[str], *quick: str) -> list[object]:
+    """Phases as parameters: all but the quick ones are marked slow."""
+    return [pytest.param(phase, marks=() if phase in quick else pytest.mark.slow) for phase in phases]
+
+
 FAIR = replace(FairSettings(), planar="none", projection=replace(FairSettings().projection, max_iterations=3))
 FAIR_PHASES = {
     "start": ("job.recipe:one_start", 1, 0),
     "measuring the start": ("fair.recipe:fair_measures", 1, 0),
-    "problem": ("fair.problem:boundary_corners", 1, 0),
+    "problem": ("fair.feature_curves:boundary_corners", 1, 0),
     "plan": ("fair.problem:FairProblem.shares", 1, 0),
     "first terms": ("fair.problem:FairProblem.terms", 1, 0),
     "first compiled": ("job.compiled_problems:GuidedProjection", 1, 0),
@@ -150,7 +155,7 @@ def surfaces() -> list[JobResult[Level]]:
 
 
 @WAYS
-@pytest.mark.parametrize("phase", FORM_PHASES)
+@pytest.mark.parametrize("phase", mostly_slow(FORM_PHASES, "start", "finer compiled", "measuring the level"))
 def test_lowering_c_keeps_the_stages_and_levels_done(
     phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, surfaces: list[JobResult[Level]]
 ) -> None:
@@ -294,7 +299,9 @@ def whole() -> JobResult[SymmetricLevel]:
 
 
 @WAYS
-@pytest.mark.parametrize("phase", SYMMETRIC_PHASES)
+@pytest.mark.parametrize(
+    "phase", mostly_slow(SYMMETRIC_PHASES, "first compiled", "finer problem", "measuring the result")
+)
 def test_a_design_keeps_the_levels_done(
     phase: str, act: Act, monkeypatch: pytest.MonkeyPatch, whole: JobResult[SymmetricLevel]
 ) -> None:

@@ -81,6 +81,7 @@ def test_slender_tubes_are_not_taken_for_waisted_ones() -> None:
     assert result.after["smallest_angle_degrees"] > 10.0
 
 
+@pytest.mark.slow
 def test_refinement_comes_nearer_to_the_cone() -> None:
     vertices, topology = barrel(Cone(1.0, 0.5, 1.0), 1.0, 0.5, 1.0, "irregular")
     coarse, fine = (minimise_absolute_curvature(vertices, topology, levels=levels) for levels in (0, 1))
@@ -187,7 +188,7 @@ def test_tangent_planes_along_patches_with_corners_are_met(kind: str) -> None:
         assert float(away.max()) < 0.01
 
 
-@pytest.mark.parametrize("unit", [1e-3, 1000.0])
+@pytest.mark.parametrize("unit", [1e-3, pytest.param(1000.0, marks=pytest.mark.slow)])
 def test_results_do_not_depend_on_the_unit(unit: float) -> None:
     vertices, topology = start_surface([wave()], 200)
     plain = minimise_absolute_curvature(vertices, topology)

@@ -129,6 +129,17 @@ def test_far_handles_are_dragged_and_end_no_higher_than_a_session() -> None:
     assert result.holds
 
 
+def test_far_handles_pull_up_no_flat_fins() -> None:
+    """A fin that is folded flat has the smaller C, since its bending cancels within stars; no step folds so far."""
+    vertices, topology = start_surface([ring(2.0, 0.0), ring(0.8, 0.3)], 90)
+    inner = torch.where(topology.is_boundary_vertex, torch.inf, (vertices - 1.4 * UP.roll(1)).norm(dim=1))
+    handle = int(inner.argmin())
+    target = vertices[handle] + 4.0 * float(edge_lengths(vertices, topology).mean()) * UP
+    result = minimise_absolute_curvature(vertices, topology, handles={handle: target.tolist()})
+    assert result.after["largest_dihedral_angle_degrees"] <= 150.0
+    assert result.holds
+
+
 def test_near_handles_and_single_starts_are_as_ever() -> None:
     vertices, topology = wavy_grid(7, 6, triangles=True)
     result = minimise_absolute_curvature(vertices, topology)
@@ -164,6 +175,8 @@ def test_closed_meshes_and_other_curves_are_refused() -> None:
     for other in (ring(3.0, 0.0), ring(1.0, 2.0), ring(0.4, 0.0)):
         with pytest.raises(MeshError, match="is not the boundary of the mesh"):
             minimise_absolute_curvature(vertices, topology, curves=[other])
+    hexagon = start_surface([ring(1.0, 0.0)], 7)  # its vertices are far from each other, and on the curve
+    FormRecipe(*hexagon, curves=[ring(1.0, 0.0)])
     near = minimise_absolute_curvature(vertices, topology, curves=[ring(1.05, 0.0)])
     assert near.after["largest_boundary_distance"] < 1e-9
     two = [ring(1.0, 0.0), ring(1.0, 1.0)]

@@ -33,7 +33,7 @@ def noisy(vertices: Tensor, size: float) -> Tensor:
     return vertices + size * torch.randn(vertices.shape, dtype=DOUBLE, generator=generator)
 
 
-@pytest.mark.parametrize("scale", [1.0, 1000.0])
+@pytest.mark.parametrize("scale", [1.0, pytest.param(1000.0, marks=pytest.mark.slow)])
 def test_a_noisy_sphere_returns_to_the_exact_sphere(scale: float) -> None:
     mesh = icosphere(1)
     start = scale * noisy(mesh.vertices, 0.01) + 5.0 * scale
@@ -74,6 +74,7 @@ def test_vertices_slide_on_the_exact_torus_and_lower_the_energy() -> None:
     assert (torch.hypot(torch.hypot(x, y) - 2.0, z) - 0.8).abs().max() > 2.0 * exact
 
 
+@pytest.mark.slow
 def test_finer_levels_stay_on_the_exact_sphere() -> None:
     mesh = icosphere(0)
     settings = FairSettings(closeness_weight=1e4, distance_limit=None, projection=QUICK)

@@ -136,7 +136,9 @@ def test_weights_act_on_the_next_step() -> None:
     assert lags[1] < 0.1 * lags[0]
 
 
-@pytest.mark.parametrize("at", ["start", "dragged", "settled"])
+@pytest.mark.parametrize(
+    "at", [pytest.param("start", marks=pytest.mark.slow), "dragged", pytest.param("settled", marks=pytest.mark.slow)]
+)
 def test_snapshots_bring_everything_back_bit_for_bit(at: str) -> None:
     session = opened(rounds=2, most_steps=60)
     if at != "start":

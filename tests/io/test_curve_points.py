@@ -46,7 +46,7 @@ def test_comments_headings_normals_and_a_repeated_end(tmp_path: Path) -> None:
     ("content", "message"),
     [
         (b"", "empty"),
-        (b"# nothing\n", "no points"),
+        (b"# nothing\n", "no numbers"),
         (b"0 0 0\n1 0\n", "line 2: expected three or six"),
         (b"1 2 3 4\n", "line 1"),
         (b"0 0 0\n1 x 0\n", "line 2"),
@@ -59,3 +59,41 @@ def test_bad_files_are_named_with_their_line(tmp_path: Path, content: bytes, mes
     with pytest.raises(MeshFileError, match=message) as error:
         load_curve(path)
     assert "curve.xyz" in str(error.value)
+
+
+TRIANGLE = [[0.5, 0.0, 0.0], [1.5, 1.0, 0.0], [0.25, 2.0, -1.5]]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "0,5;0,0;0,0\n1,5;1,0;0,0\n0,25;2;-1,5\n",
+        "x;y;z\n0,5 ; 0,0 ; 0,0\n1,5 ; 1,0 ; 0,0\n0,25 ; 2 ; -1,5\n",
+        "0,5 0,0 0,0\n1,5 1,0 0,0\n25,0e-2 2 -1,5\n",
+        "0,5\t0,0\t0,0\n15e-1\t1,0\t0\n0,25\t2,0\t-1,5\n",
+        "0.5,0.0,0.0\n1.5,1.0,0.0\n0.25,2,-1.5\n",
+        "0.5, 0, 0\n1.5, 1, 0\n0.25, 2, -1.5\n",
+        "0.5,0.0,0.0;\n1.5,1.0,0.0;\n0.25,2,-1.5;\n",
+        "0.5;0.0;0.0\n1.5;1.0;0.0\n0.25;2;-1.5\n",
+    ],
+)
+def test_decimal_commas_are_told_from_separators(tmp_path: Path, content: str) -> None:
+    (tmp_path / "curve.csv").write_text(content)
+    points, normals, _ = load_curve(tmp_path / "curve.csv")
+    assert points.tolist() == TRIANGLE
+    assert normals is None
+
+
+def test_commas_between_whole_numbers_separate_them(tmp_path: Path) -> None:
+    (tmp_path / "curve.csv").write_text("0,0,0 0,0,1\n1,0,0 0,0,1\n1,1,0 0,1,1\n")
+    points, normals, _ = load_curve(tmp_path / "curve.csv")
+    assert points.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
+    assert normals is not None
+    assert normals.tolist() == [[0, 0, 1], [0, 0, 1], [0, 1, 1]]
+
+
+@pytest.mark.parametrize("row", ["0.5;0,5;1", "1.234,5;0;0", "0.5 0,5", "0,5;1;x", "1.0;2,0;3,0"])
+def test_commas_that_may_be_either_are_refused(tmp_path: Path, row: str) -> None:
+    (tmp_path / "curve.csv").write_text(f"0;0;0\n{row}\n1;1;1\n")
+    with pytest.raises(MeshFileError, match=r"line 2: .*not clear whether its comma is a decimal mark"):
+        load_curve(tmp_path / "curve.csv")

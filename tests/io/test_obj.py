@@ -10,8 +10,8 @@ from helpers import wavy_grid
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from torchfair import MeshFileError
-from torchfair.io import load_mesh
+from torchfair import MeshError, MeshFileError
+from torchfair.io import load_mesh, save_mesh
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
@@ -61,6 +61,54 @@ l 1 2 3
 p 1
 """
     assert load(tmp_path, text)[1] == [[0, 1, 2, 3]]
+
+
+def test_what_other_programs_write_is_passed_over(tmp_path: Path) -> None:
+    """Materials in the file itself, old outlines, and the sign that ends files of old systems."""
+    text = f"{SQUARE}newmtl C:\\glass\\\nKd 1 1 1\nmap_Kd a.png\nt 0 0\nf 1 2 3\nfo 1 3 4\n\x1a\0\xffv 1"
+    assert load(tmp_path, text.encode("latin-1"))[1] == [[0, 1, 2], [0, 2, 3]]
+
+
+def attributes_text(tmp_path: Path, text: str, **options: bool) -> list[str]:
+    """A file read, and written back with what goes with its faces."""
+    (tmp_path / "in.obj").write_text(text)
+    mesh = load_mesh(tmp_path / "in.obj", **options)
+    save_mesh(tmp_path / "out.obj", mesh.vertices, mesh.topology, attributes=mesh.attributes, overwrite=True)
+    return [line for line in (tmp_path / "out.obj").read_text().splitlines() if not line.startswith("v ")]
+
+
+def test_what_goes_with_faces_comes_back(tmp_path: Path) -> None:
+    body = "vt 0 0\nvt 1 0 0\nvt .5 1\no part\ng a b\nf 1/1 2/2 3/3\nusemtl red\ns 1\nf 1/-3 3/-1 4\ng end\n"
+    kept = [
+        "vt 0 0",
+        "vt 1 0 0",
+        "vt .5 1",
+        "o part",
+        "g a b",
+        "f 1/1 2/2 3/3",
+        "usemtl red",
+        "s 1",
+        "f 1 3 4",
+        "g end",
+    ]
+    assert attributes_text(tmp_path, SQUARE + body) == kept  # texture coordinates of whole faces alone are a face's
+    twice = body.replace("f 1/1 2/2 3/3\n", "f 1/1 2/2 3/3\nf 2/2 3/3 1/1\nf 1 2 2\n")
+    assert attributes_text(tmp_path, SQUARE + twice, repair=True) == kept
+
+
+def test_corners_of_faces_that_are_turned_over_keep_their_texture(tmp_path: Path) -> None:
+    text = f"{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 4/4 3/3 1/1\n"
+    assert attributes_text(tmp_path, text, repair=True)[-2:] == ["f 1/1 2/2 3/3", "f 4/4 1/1 3/3"]
+
+
+def test_attributes_of_another_mesh_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "in.obj").write_text(f"{SQUARE}vt 0 0\nf 1/1 2/1 3/1\n")
+    mesh = load_mesh(tmp_path / "in.obj")
+    vertices, topology = wavy_grid(3, 3)
+    with pytest.raises(MeshError, match="attributes: they are those of a mesh with other"):
+        save_mesh(tmp_path / "out.obj", vertices, topology, attributes=mesh.attributes)
+    with pytest.raises(MeshFileError, match="not those of such a file"):
+        save_mesh(tmp_path / "out.off", mesh.vertices, mesh.topology, attributes=mesh.attributes)
 
 
 @pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"])
@@ -117,6 +165,7 @@ FAULTS = [
     (SQUARE + "v 0 nan 0\nf 1 2 3\n", 5, r"vertex 5 has coordinates that are not finite numbers: 0\.0, nan, 0\.0"),
     (SQUARE + "v 0 1e999 0\nf 1 2 3\n", 5, "not finite"),
     (SQUARE + "f 1 2\n", 5, r"face 1 has 2 corner\(s\)"),
+    (SQUARE + "vt 0 0\nf 1/1 2/2 3/1\n", 6, "names texture coordinates 2, but there are 1"),
     (SQUARE + "f\n", 5, r"face 1 has 0 corner\(s\)"),
     (SQUARE + "f 1 2 3\n\nf 1 2 5\n", 7, r"face 2 uses vertex 5, but the vertices are numbered 1\.\.4"),
     (SQUARE + "f 0 1 2\n", 5, "face 1 uses vertex 0"),
@@ -133,7 +182,7 @@ FAULTS = [
     (SQUARE, None, "the mesh has no faces"),
     ("f 1 2 3\n", None, "the mesh has no vertices"),
     ("# nothing\n", None, "no vertices"),
-    (SQUARE + "f 1 2 3 3\n", None, "more than once: faces 0"),
+    (SQUARE + "f 1 2 3 3\n", 5, r"more than once: faces 1 \(line 5\)\. .*repair=True.* mends this"),
     (b"v 0 0 0\nv \x00", 2, "binary data"),
     ("v 0 0 0\n".encode("utf-16"), None, "UTF-16"),
     (b"v 0 0 \xff\n", 1, "expected a number"),

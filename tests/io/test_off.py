@@ -42,6 +42,28 @@ def test_headers(tmp_path: Path, header: str) -> None:
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "OFF 4 2 0 0 0 0 1 0 0 1 1 0 0 1 0.5 3 0 1 2 3 0 2 3",
+        "OFF\n4\n2\n0\n" + "\n".join(POINTS) + "\n3 0 1 2 3 0 2 3",
+        "OFF 4 2 5 # counts\n0 0 0 1 0 0\n1 1 0 0 1 0.5\n3\n0 1 2\n3\n0 2 3\n",
+        "4 2 0\n" + "\n".join([*POINTS, *HYBRID]),
+        "4 2\n" + "\n".join([*POINTS, *HYBRID]),
+        "COFF 4 2 0\n" + " ".join(f"{point} 1 0 0 1" for point in POINTS) + "\n" + " ".join(HYBRID),
+        "COFF 4 2 0\n" + " ".join(f"{point} 255 0 0" for point in POINTS) + "\n" + " ".join(HYBRID),
+    ],
+)
+def test_numbers_may_stand_on_any_lines(tmp_path: Path, text: str) -> None:
+    assert load(tmp_path, text) == EXPECTED
+
+
+def test_faults_in_free_format_have_lines(tmp_path: Path) -> None:
+    with pytest.raises(MeshFileError, match="face 1 uses vertex 7") as caught:
+        load(tmp_path, "OFF 4 2 0\n0 0 0 1 0 0\n1 1 0 0 1 0.5\n3\n0 1 2\n3\n0 2 7\n")
+    assert caught.value.line == 6
+
+
+@pytest.mark.parametrize(
     ("keyword", "extra"),
     [
         ("COFF", " 255 0 0 255"),
@@ -98,7 +120,7 @@ FAULTS = [
     (document(faces=["3 0 1 2", "3 0 2 1.0"]), 8, "whole number .* got '1.0'"),
     ("OFF\n4 0 0\n" + "\n".join(POINTS), None, "the mesh has no faces"),
     ("OFF\n0 0 0\n", None, "the mesh has no vertices"),
-    (document(faces=["3 0 1 2", "3 0 1 3"]), None, "inconsistent orientation"),
+    (document(faces=["3 0 1 2", "3 0 1 3"]), 7, r"faces 0 \(line 7\) and 1 \(line 8\) along edge \(0, 1\)"),
 ]
 
 

@@ -150,7 +150,7 @@ def test_repair_on_reading(tmp_path: Path) -> None:
     path = tmp_path / "m.obj"
     path.write_text("v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 2 3 4\nf 3 4 5\n")
     with pytest.raises(
-        MeshFileError, match=r"m\.obj: inconsistent orientation: .*repair=True \(--repair on the command"
+        MeshFileError, match=r"line 6: inconsistent.* faces 1 \(line 6\) and .*\(--repair on the command"
     ):
         load_mesh(path)
     mesh = load_mesh(path, repair=True)
@@ -165,4 +165,10 @@ def test_what_repair_cannot_mend(tmp_path: Path) -> None:
     for repair in (False, True):
         with pytest.raises(MeshFileError, match="non-manifold") as caught:
             load_mesh(path, repair=repair)
-        assert ("repair=True" in str(caught.value)) is not repair
+        assert "repair=True" not in str(caught.value)
+        assert "split_edges=True (--split-edges on the command line) mends this: split 2 vertex" in str(caught.value)
+    moebius = "".join(f"3 {i} {(i + 1) % 5} {(i + 2) % 5}\n" for i in range(5))
+    path.write_text(f"OFF\n5 5 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n{moebius}")
+    with pytest.raises(MeshFileError, match="inconsistent orientation") as caught:
+        load_mesh(path)
+    assert "mends" not in str(caught.value)

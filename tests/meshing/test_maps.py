@@ -12,9 +12,13 @@ from meshing_tools import Flat, MonkeySaddle, cut, ellipsoid, irregular, nearest
 
 from torchfair import Topology
 from torchfair.boundary import boundary_corners
-from torchfair.meshing.boundary_runs import find_runs, inward_moves
+from torchfair.fields import FaceFrames
+from torchfair.meshing.boundary_runs import find_runs
 from torchfair.meshing.chords import find_chords, find_lattice_points
-from torchfair.meshing.crossings import find_crossings, off_the_lines
+from torchfair.meshing.crease_runs import CreaseLines
+from torchfair.meshing.creases import find_creases
+from torchfair.meshing.crossings import find_crossings
+from torchfair.meshing.off_lines import off_the_lines
 from torchfair.meshing.seamless_map import SeamlessMap
 from torchfair.meshing.seams import ROTATIONS, find_seams
 from torchfair.meshing.tracing import Cells, trace_cells
@@ -24,12 +28,15 @@ from torchfair.shapes import Cylinder, PrincipalParaboloid, Torus, icosphere
 SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
 
 
+def uncreased(frames: FaceFrames) -> CreaseLines:
+    none = find_creases(frames, np.zeros(len(frames.faces), bool), 0.7, 0.0)
+    return CreaseLines(none, [], np.zeros(len(frames.points), bool))
+
+
 def cells_of(found: SeamlessMap, runs: list) -> Cells:
     frames = found.frames
     corners = boundary_corners(torch.from_numpy(frames.points), frames.topology, 0.7).numpy()
-    return trace_cells(
-        found, off_the_lines(found, inward_moves(found.seams, found.values, frames.triangles, runs)), corners
-    )
+    return trace_cells(found, off_the_lines(found, runs), corners, uncreased(frames))
 
 
 def euler_number(topology: Topology) -> int:
@@ -55,7 +62,7 @@ def test_cut_open_a_surface_is_a_disk(name: str) -> None:
     assert len(whole.boundary_loops()) == 1
     on_rim = np.zeros(len(frames.points), bool)
     on_rim[frames.triangles.ravel()[np.isin(copies.ravel(), whole.loop_vertices.numpy())]] = True
-    assert on_rim[graph.singular].all()
+    assert on_rim[graph.nodes].all()
     assert on_rim[frames.is_boundary].all()
     assert not graph.quarters[~graph.cut].any()
 
@@ -71,7 +78,7 @@ def test_maps_fit_together_over_the_cuts(name: str) -> None:
         off = found.values[copies[g, right]] - turn * found.values[copies[f, left]] - found.translations
         assert np.abs(off[graph.cut]).max(initial=0) < 1e-8
     assert (found.translations == np.rint(found.translations.real) + 1j * np.rint(found.translations.imag)).all()
-    at_singular = found.values[graph.singular[found.seams.vertex]]
+    at_singular = found.values[graph.nodes[found.seams.vertex]]
     assert (at_singular == np.rint(at_singular.real) + 1j * np.rint(at_singular.imag)).all()
 
 
@@ -133,7 +140,7 @@ def test_lines_through_vertices_and_along_edges_are_no_trouble() -> None:
         area = sum(_area(cells.positions[face]) for face in cells.faces)
         assert area == pytest.approx(64, abs=1e-5)
         crossings = find_crossings(found, off_the_lines(found))
-        chords = find_chords(found, crossings)
+        chords = find_chords(found, crossings, uncreased(found.frames).creases.edges)
         count = len(find_lattice_points(chords, len(frames.triangles)).chords)
         side = {(1.0, 0.0): (7, 9), (0.5, 0.0): (3, 5), (1.0, 0.5): (8, 8)}[scale, origin]
         assert side[0] ** 2 <= count <= side[1] ** 2  # points on the boundary fall on either side

@@ -11,6 +11,8 @@ from torchfair.meshing.boundary_cells import compact, tidy_boundary
 from torchfair.meshing.polygon_edits import PolygonEdits
 from torchfair.meshing.tracing import Cells
 
+NO_CREASES = np.zeros((0, 2), np.int64)
+
 
 def grid(rows: int = 4, columns: int = 4) -> tuple[np.ndarray, list[list[int]], np.ndarray]:
     """Positions, quads, and which vertices are on the boundary."""
@@ -71,7 +73,7 @@ def test_the_last_face_does_not_vanish() -> None:
 def test_faces_are_not_turned_over() -> None:
     found = edits()
     found.positions[5] = [2.5, 0.4, 0]  # folded beforehand: collapsing another edge must not count that as its side
-    found = PolygonEdits(found.positions, list(found.faces.values()), found.on_boundary, found.fixed)
+    found = PolygonEdits(found.positions, list(found.faces.values()), found.on_curve, found.fixed)
     start = {number: found.area(number) for number in found.faces}
     found.collapse((6, 10))
     assert all(found.area(number) > 0 or start[number] <= 0 for number in found.faces)
@@ -100,8 +102,8 @@ def test_slivers_and_short_edges_go(far: float) -> None:
     positions = 0.01 * positions + far
     corner = np.isin(np.arange(len(positions)), [0, 24, 5, 29])
     on = [[0, 1, 0, 1] for _ in faces]
-    cells = Cells(positions, faces, on, outer, np.zeros(len(positions), bool), corner)
-    tidied, left, _ = compact(tidy_boundary(cells, 0.01, 1e-4))
+    cells = Cells(positions, faces, on, outer, corner, NO_CREASES)
+    tidied, left, *_ = compact(tidy_boundary(cells, 0.01, 1e-4))
     topology = Topology.from_faces(left, len(tidied))
     assert topology.num_vertices - topology.num_edges + topology.num_faces == 1
     assert topology.num_faces == 16
@@ -120,5 +122,5 @@ def test_areas_do_not_depend_on_the_place() -> None:
 def test_bulges_over_one_line_are_dropped() -> None:
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     outer, corner = np.ones(4, bool), np.zeros(4, bool)
-    cells = Cells(positions, [[0, 1, 2, 3], [1, 0]], [[0, 1, 0, 1], [2, 0]], outer, corner, ~corner)
+    cells = Cells(positions, [[0, 1, 2, 3], [1, 0]], [[0, 1, 0, 1], [2, 0]], outer, ~corner, NO_CREASES)
     assert compact(tidy_boundary(cells, 1.0, 1.0)).faces == [[0, 1, 2, 3]]

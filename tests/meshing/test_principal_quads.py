@@ -61,7 +61,7 @@ def check(mesh: QuadMesh, vertices: Tensor, topology: Topology) -> None:
 
 
 @pytest.mark.parametrize("surface", [Torus(), SADDLE, Catenoid()], ids=lambda surface: type(surface).__name__)
-@pytest.mark.parametrize("count", [150, 600])
+@pytest.mark.parametrize("count", [150, pytest.param(600, marks=pytest.mark.slow)])
 def test_edges_follow_exact_directions(surface: Surface, count: int) -> None:
     mesh = irregular_triangles(surface, 2000)
     found = principal_quads(mesh.vertices, mesh.topology, count=count)
@@ -169,7 +169,7 @@ def test_polygons_are_cut_into_triangles() -> None:
     assert found.report["angle_mean_degrees"] < 0.5
 
 
-@pytest.mark.parametrize("noise", [0.05, 0.2])
+@pytest.mark.parametrize("noise", [0.05, pytest.param(0.2, marks=pytest.mark.slow)])
 def test_noise_is_averaged_away(noise: float) -> None:
     mesh = irregular_triangles(SADDLE, 2000)
     edge = (mesh.vertices[mesh.topology.edges[:, 1]] - mesh.vertices[mesh.topology.edges[:, 0]]).norm(dim=1).mean()
@@ -180,7 +180,7 @@ def test_noise_is_averaged_away(noise: float) -> None:
     assert "rings" in found.notes[0]
 
 
-@pytest.mark.parametrize("count", [150, 500])
+@pytest.mark.parametrize("count", [150, pytest.param(500, marks=pytest.mark.slow)])
 def test_the_count_is_about_that_asked_for(count: int) -> None:
     """On this surface lines diverge: with the spacing of the count there are a fifth fewer faces."""
     vertices, topology = irregular(FreeFormPatch(), 2000)
@@ -259,6 +259,9 @@ def test_what_is_wrong_with_the_input_is_said() -> None:
         ("align_boundary", 1, "align_boundary"),
         ("boundary_angle", 1.0, "boundary_angle"),
         ("corner_angle", 0.0, "corner_angle"),
+        ("adaptive", 1, "adaptive"),
+        ("spacing_range", 0.9, "spacing_range"),
+        ("spacing_range", math.inf, "spacing_range"),
         ("time_limit", -1.0, "time_limit"),
     ],
 )

@@ -204,6 +204,7 @@ def test_guided_projection_makes_good_saddles_of_bad_stars() -> None:
     assert int(after.sum()) >= 28
 
 
+@pytest.mark.slow
 def test_bad_saddles_of_a_mesh_are_removed_near_its_surface_with_few_vertices_moved() -> None:
     """Bad stars and their neighbours are free; closeness keeps them on the surface, a weak pull where they were."""
     random = torch.Generator().manual_seed(1)

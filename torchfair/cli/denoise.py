@@ -46,7 +46,7 @@ class DenoiseCommand(JobCommand):
 
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""
-        return Request(read_input(arguments.input, arguments.repair), {})
+        return Request(read_input(arguments.input, arguments), {})
 
 
 COMMAND = DenoiseCommand()

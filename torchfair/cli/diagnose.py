@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 from ..io.json_text import to_json
 from .arguments import count
 from .errors import CommandError
-from .inputs import read_input
+from .inputs import add_repair, read_input
 from .outputs import refuse_existing
+from .reading import said_of
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
@@ -62,7 +63,7 @@ def add_parser(subparsers: Any) -> None:
         "(counted from 0); repeatable; by default of the worst, then of some of each class")  # fmt: skip
     add("--no-pictures", action="store_true", help="write no pictures")
     add("--force", action="store_true", help="replace files that exist")
-    add("--repair", action="store_true", help="orient faces consistently and drop unused vertices first")
+    add_repair(parser)
     parser.set_defaults(run=run, name=NAME)
 
 
@@ -71,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..measuring import diagnose_mesh, layout_advice
 
     files = _files(arguments)
-    mesh = read_input(arguments.input, arguments.repair)
+    mesh = read_input(arguments.input, arguments)
     _check_vertices(arguments.vertex, mesh)
     diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
     numbers, worst = diagnosis.counts(), diagnosis.worst_vertices(arguments.worst)
@@ -81,6 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
         **numbers,
         "file": arguments.input,
         "repairs": list(mesh.repairs),
+        "notes": list(mesh.notes),
         "worst_vertices": worst,
         "advice": advice,
     }
@@ -91,8 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         sys.stdout.write(to_json(report))
         return 0
-    for sentence in mesh.repairs:
-        print(f"repaired: {sentence}")
+    for line in said_of(mesh):
+        print(line)
     print(f"{arguments.input}\n{format_counts(numbers)}")
     if worst:
         print(format_vertices(worst, _first_number(arguments.input)))

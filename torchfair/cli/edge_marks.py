@@ -82,9 +82,7 @@ def read_marks(mesh: PolygonMesh, arguments: argparse.Namespace) -> tuple[Tensor
     file = marks_file(arguments)
     if file is None:
         return None, []
-    if mesh.repairs:
-        return None, [f"marked edges of {file} are left out: they are for the vertex numbers of the file"]
-    return load_edge_labels(file, mesh.topology), []
+    return load_edge_labels(file, mesh.topology, vertex_map=mesh.vertex_map), []
 
 
 class MarkedOutputs(Outputs):

@@ -8,7 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .edge_marks import MarkedOutputs, read_marks
-from .inputs import add_handles, add_levels, add_reference, add_repair, read_handles, read_input, read_reference
+from .inputs import (
+    add_fixed,
+    add_handles,
+    add_levels,
+    add_reference,
+    add_repair,
+    read_fixed,
+    read_handles,
+    read_input,
+    read_reference,
+)
 from .job_command import JobCommand
 from .outputs import Request, Writer
 from .pictures import draw_before_after
@@ -60,11 +70,12 @@ class FairCommand(JobCommand):
         return minimise_normal_variation
 
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
-        """A mesh, a surface to stay close to, and handles."""
+        """A mesh, a surface to stay close to, handles, and vertices that stay."""
         parser.add_argument("input", metavar="INPUT", help="mesh file, or example:roof or example:hybrid_roof")
         add_reference(parser, "stay close to this surface instead of the input")
         add_levels(parser)
         add_handles(parser)
+        add_fixed(parser)
         add_repair(parser)
 
     def outputs(self, arguments: argparse.Namespace) -> MarkedOutputs:
@@ -73,12 +84,13 @@ class FairCommand(JobCommand):
 
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""
+        mesh = read_input(arguments.input, arguments)
         options = {
             "reference": read_reference(arguments),
-            "handles": read_handles(arguments),
+            "handles": read_handles(arguments, mesh),
             "levels": arguments.levels,
         }
-        mesh = read_input(arguments.input, arguments.repair)
+        options["fixed"] = read_fixed(arguments, mesh)
         marks, notes = read_marks(mesh, arguments)
         return Request(mesh, options, notes=notes, marks=marks)
 

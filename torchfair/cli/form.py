@@ -64,6 +64,8 @@ class FormCommand(JobCommand):
         add("--close", action="store_true", help="close open arcs by straight lines")
         add("--starts", type=positive_count, metavar="N", help="try so many surfaces to start from, and go on with the "
             f"best (default {_STARTS} from curves alone, 1 from a mesh)")  # fmt: skip
+        add("--remesh", action="store_true", help="replace the triangles where they become thin or fold, and go on: "
+            "vertices have other numbers then; always done without a mesh to start from")  # fmt: skip
         add("--vertices", type=positive_count, default=1000, metavar="N", help="size of a start made from curves "
             "(default 1000)")  # fmt: skip
         add("--through", nargs=3, action="append", default=[], type=float, metavar=("X", "Y", "Z"),
@@ -83,8 +85,9 @@ class FormCommand(JobCommand):
         options = {
             "curves": start.curves or None,
             "normals": start.normals,
-            "handles": read_handles(arguments) | start.nearest(arguments.through),
+            "handles": read_handles(arguments, start.mesh) | start.nearest(arguments.through),
             "levels": arguments.levels,
+            "remesh": arguments.remesh or arguments.input is None,
             "starts": arguments.starts or (_STARTS if arguments.input is None else 1),
         }
         return Request(start.mesh, options, notes=start.notes)

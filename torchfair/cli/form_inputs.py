@@ -94,7 +94,7 @@ def read_form_input(arguments: argparse.Namespace, corner_angle: float) -> FormI
     files = [file for name in arguments.curve for file in load_curves(name, close=arguments.close)]
     curves = [ClosedCurve(file.points, corner_angle=corner_angle) for file in files]
     if arguments.input is not None:
-        mesh = read_input(arguments.input, arguments.repair)
+        mesh = read_input(arguments.input, arguments)
     else:
         mesh = PolygonMesh(*start_surface(curves, arguments.vertices))
     given = [(curve, file.normals) for curve, file in zip(curves, files, strict=True) if file.normals is not None]

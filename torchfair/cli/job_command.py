@@ -11,6 +11,7 @@ from .exit_codes import IN_WORDS, exit_code
 from .options import SettingOptions
 from .outputs import Outputs, Request, Writer, add_outputs, asked_for
 from .parser import CommandParser
+from .reading import in_numbers_of
 from .summary import kept_lines, measures_table, missed_lines, note_lines, work_lines
 
 if TYPE_CHECKING:
@@ -96,11 +97,13 @@ class JobCommand(ABC):
         request = self.read(arguments, settings)
         settings = request.settings or settings
         outputs.make_folders()
-        result = self._solve(request, settings)
+        mesh = request.mesh
+        with in_numbers_of(mesh):
+            result = self._solve(request, settings)
         outputs.write_mesh(request, result)
         missed = [*missed_lines(result, getattr(arguments, "levels", 0)), *request.missed]
         lines = [
-            *note_lines(request.mesh.repairs, [*request.notes, *result.notes], missed),
+            *note_lines(mesh.repairs, [*mesh.notes, *request.notes, *result.notes], missed),
             *measures_table(result.before, result.after),
             *kept_lines(result),
             *work_lines(result),
@@ -121,5 +124,7 @@ class JobCommand(ABC):
     ) -> dict[str, Any]:
         from ..formfinding import job_report
 
-        own = {"job": self.job, "request": asked_for(arguments), **request.report}
+        mesh = request.mesh
+        read = {"repairs": mesh.repairs, "input_notes": mesh.notes, "vertex_map": mesh.vertex_map}
+        own = {"job": self.job, "request": asked_for(arguments), **read, **request.report}
         return {**own, **job_report(result, settings)}

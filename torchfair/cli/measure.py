@@ -10,6 +10,7 @@ from ..io.json_text import to_json
 from .arguments import count
 from .errors import CommandError
 from .inputs import add_reference, add_repair, read_input, read_reference
+from .reading import said_of
 
 if TYPE_CHECKING:
     from ..measuring import EdgeMeasures, Quantity
@@ -89,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.per_vertex and not (arguments.json and arguments.reference):
         raise CommandError("--per-vertex gives lists with --json and --reference only", NAME)
-    mesh, reference = read_input(arguments.input, arguments.repair), read_reference(arguments)
+    mesh, reference = read_input(arguments.input, arguments), read_reference(arguments)
     quantities = measure_mesh(mesh.vertices, mesh.topology)
     lists = {}
     if reference is not None:
@@ -104,6 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
         entries = {
             "file": arguments.input,
             "repairs": list(mesh.repairs),
+            "notes": list(mesh.notes),
             "units": {quantity.key: _unit(quantity) for quantity in quantities},
             "worst_edges": worst,
             **lists,
@@ -111,8 +113,8 @@ def run(arguments: argparse.Namespace) -> int:
         }
         sys.stdout.write(to_json({**{quantity.key: quantity.value for quantity in quantities}, **entries}))
     else:
-        for sentence in mesh.repairs:
-            print(f"repaired: {sentence}")
+        for line in said_of(mesh):
+            print(line)
         print(f"{arguments.input}\n{format_quantities(quantities)}")
         for doubt in doubts:
             print(f"\nC is not to be trusted: {doubt}")

@@ -17,6 +17,7 @@ from .mesh_planar import made_planar
 from .options import SettingOptions
 from .outputs import Outputs, Request, Writer, add_outputs, asked_for
 from .parser import CommandParser
+from .reading import in_numbers_of
 from .summary import note_lines
 
 if TYPE_CHECKING:
@@ -43,6 +44,9 @@ _ROWS = {
     "total_absolute_curvature": "C of the surface",
     "variation_over_curvature": "E/C",
     "distance_max": "largest distance from the surface, in mean edges",
+    "spacing_shortest": "shortest spacing asked for",
+    "spacing_longest": "longest ...",
+    "range_share": "share of the surface at the ends of the range",
 }
 
 
@@ -88,17 +92,19 @@ def run(arguments: argparse.Namespace) -> int:
     settings = options().settings(arguments)
     outputs = MeshOutputs(arguments, {"mesh.png": draw_singular, "edges.png": _edges})
     outputs.prepare()
-    surface = read_input(arguments.input, arguments.repair)
+    surface = read_input(arguments.input, arguments)
     outputs.make_folders()
     began = time.perf_counter()
-    made = _made(surface, arguments, settings)
+    with in_numbers_of(surface):
+        made = _made(surface, arguments, settings)
     missed: list[str] = []
     status = None
     if arguments.planar:
         made, missed, status = made_planar(made, surface)
     request = Request(surface, {})
     outputs.write_mesh(request, made)
-    lines = [*note_lines(surface.repairs, made.notes, missed), *table(made.report)]
+    notes = [*surface.notes, *made.notes, *request.notes]
+    lines = [*note_lines(surface.repairs, notes, missed), *table(made.report)]
     report = _report(arguments, made, settings, missed, time.perf_counter() - began)
     outputs.finish(request, made, lines, report, missed)
     return exit_code(status, missed)
@@ -153,7 +159,7 @@ def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
 def table(report: Mapping[str, Any]) -> list[str]:
     """What was measured on a principal mesh, one line for each."""
     width = max(map(len, _ROWS.values()))
-    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items()]
+    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items() if name in report]
     found = ", ".join(f"{count} of index {index}" for index, count in report["singular"].items())
     return [*lines, f"{'singular points':<{width}}  {found or 'none':>10}"]
 

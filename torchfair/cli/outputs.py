@@ -14,9 +14,12 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from ..io import PolygonMesh
+    from ..topology import Topology
 
 _NOT_ASKED = ("run", "name", "version")
-_MESH_FORMATS = (".obj", ".off", ".ply")
+_MESH_FORMATS = (".obj", ".off", ".ply", ".stl", ".glb", ".3dm")
+_WITH_ATTRIBUTES = (".obj", ".3dm")
+_TRIANGLES = (".stl", ".glb")
 
 
 @dataclass
@@ -89,10 +92,11 @@ class Outputs:
 
     def write_mesh(self, request: Request, result: Any) -> None:
         """Writes what must not be lost."""
-        from ..io import save_mesh
-
         lines = self.polylines(result)
-        save_mesh(self.mesh, result.vertices, result.topology, overwrite=self.force, polylines=lines)
+        request.notes += save_result(
+            self.mesh, result.vertices, result.topology, request.mesh, force=self.force, polylines=lines,
+            marks=bool(len(lines) or self.beside),
+        )  # fmt: skip
         self._write(self.beside, request, result)
 
     def polylines(self, result: Any) -> Sequence[Tensor]:
@@ -123,10 +127,63 @@ class Outputs:
             writer(path, request, result, self.force)
 
 
+def save_result(
+    path: Path,
+    vertices: Tensor,
+    topology: Topology,
+    source: PolygonMesh,
+    *,
+    force: bool,
+    polylines: Sequence[Tensor] = (),
+    marks: bool = False,
+) -> list[str]:
+    """Writes a mesh that was made from another one, and says what of the file of that it does not hold.
+
+    Groups, materials, texture coordinates and colours of an OBJ file are written back where the faces are the same;
+    polygons are cut into triangles where the format has no others.
+
+    Args:
+        path: The file.
+        vertices: (V, 3) of the mesh.
+        topology: Of the mesh.
+        source: What it was made from.
+        force: Whether a file may be replaced.
+        polylines: Line elements of an OBJ file.
+        marks: Whether line elements of the source are carried on.
+    """
+    from ..io import RhinoParts, save_mesh
+
+    suffix, notes = path.suffix.lower(), []
+    attributes = source.attributes
+    same = topology.corners.equal(source.topology.corners) and topology.face_offsets.equal(source.topology.face_offsets)
+    if attributes is not None:
+        left_out = attributes.left_out(suffix, same, marks)
+        notes += [f"{path.name} does not hold {left_out} of the input"] if left_out else []
+    if suffix in _TRIANGLES and not topology.is_triangular:
+        from ..topology import Topology
+        from ..triangulation import triangulate
+
+        notes.append(f"{path.name} holds its polygons cut into triangles: {suffix} files have no others")
+        topology = Topology.from_faces(triangulate(vertices, topology).triangles, topology.num_vertices)
+    kept = attributes if same else None
+    if isinstance(attributes, RhinoParts):
+        kept = attributes if same else attributes.of_other_faces(topology.num_faces)
+    if isinstance(kept, RhinoParts) != (suffix == ".3dm") or suffix not in _WITH_ATTRIBUTES:
+        kept = None
+    save_mesh(path, vertices, topology, overwrite=force, polylines=polylines, attributes=kept)
+    return notes
+
+
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Adds the options that say where they go."""
     add = parser.add_argument
-    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
+    add(
+        "-o",
+        "--output",
+        required=True,
+        metavar="OUTPUT",
+        help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM)",
+    )
     add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
     add("--no-pictures", action="store_true", help="write no pictures")
     add("--force", action="store_true", help="replace files that exist")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
 from .errors import CommandError
+from .reading import with_default_tolerance
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -29,7 +31,8 @@ class CommandParser(argparse.ArgumentParser):
         fill, self._fill = self._fill, None
         if fill is not None:
             fill(self)
-        return super().parse_known_args(*args, **kwargs)
+        words = list(sys.argv[1:] if not args or args[0] is None else args[0])
+        return super().parse_known_args(with_default_tolerance(words), *args[1:], **kwargs)
 
     def error(self, message: str) -> NoReturn:
         """Refuses the arguments."""

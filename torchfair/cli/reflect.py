@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 from ..io.json_text import to_json
 from .arguments import count, positive_count, positive_or_none
 from .errors import CommandError
-from .inputs import read_input
+from .exit_codes import EXIT_NOT_REACHED, EXIT_OK
+from .inputs import add_repair, read_input
 from .outputs import refuse_existing
+from .reading import said_of
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
@@ -26,6 +28,10 @@ _DESCRIPTION = (
     "Renders a polygon mesh as a mirror, every face plane, among stripes, and compares the pictures with those of a "
     "smooth surface: the reference, or the same mesh smoothly shaded. The score is 1 - SSIM, averaged over views and "
     "stripe directions: 0 for the picture of the smooth surface."
+)
+_LEAST_COMPARED = 0.2  # of what is seen of the mesh
+_NOTHING = (
+    "nothing to compare: no view shows mesh and reference together on more than a few pixels, so there is no score"
 )
 _ROWS = {
     "score": "score (1 - SSIM; 0 is smooth)",
@@ -53,7 +59,7 @@ def add_parser(subparsers: Any) -> None:
     add("--frames", type=count, default=36, metavar="N", help="pictures of the turntable, 0 for none (default 36)")
     add("--no-pictures", action="store_true", help="write no pictures and no turntable")
     add("--force", action="store_true", help="replace files that exist")
-    add("--repair", action="store_true", help="orient faces consistently and drop unused vertices first")
+    add_repair(parser)
     parser.set_defaults(run=run, name=NAME)
 
 
@@ -64,34 +70,70 @@ def run(arguments: argparse.Namespace) -> int:
     files = _files(arguments)
     if arguments.size < _LEAST_SIZE:
         raise CommandError(f"--size {arguments.size}: pictures need at least {_LEAST_SIZE} pixels to be compared")
-    mesh = read_input(arguments.input, arguments.repair)
-    reference = read_input(arguments.reference, arguments.repair) if arguments.reference else None
+    mesh = read_input(arguments.input, arguments)
+    reference = read_input(arguments.reference, arguments) if arguments.reference else None
     with threads_for(0, mesh.vertices.device):  # pictures of this size are made of very short operations
         score = _score(mesh, reference, arguments)
         report: dict[str, Any] = dict(score.numbers())
-        report |= {"file": arguments.input, "reference": arguments.reference, "repairs": list(mesh.repairs)}
+        report |= _compared(score) | {
+            "file": arguments.input,
+            "reference": arguments.reference,
+            "repairs": list(mesh.repairs),
+            "notes": list(mesh.notes),
+        }
         if files:
             write(files, mesh, score, report, arguments)
     if arguments.json:
         sys.stdout.write(to_json(report))
-        return 0
-    for sentence in mesh.repairs:
-        print(f"repaired: {sentence}")
+        return _ended(report)
+    for line in [*said_of(mesh), *(said_of(reference, arguments.reference) if reference else [])]:
+        print(line)
     print(f"{arguments.input}\n{format_numbers(report)}")
     print("".join(f"wrote {path}\n" for path in files), end="")
-    return 0
+    return _ended(report)
+
+
+def _compared(score: ReflectionScore) -> dict[str, Any]:
+    """How much of the mesh was compared; where that is nothing, scores that are none."""
+    seen = float((score.coverage > 0.0).sum())
+    part = float(score.window.sum()) / seen if seen else 0.0
+    found: dict[str, Any] = {"compared_of_mesh": part}
+    if not part:
+        return found | dict.fromkeys(_ROWS)
+    shown = score.compared > 0.0
+    by_view = zip(score.per_view.mean(-1).tolist(), shown.tolist(), strict=True)
+    return found | {"score_by_view": [value if known else None for value, known in by_view]}
+
+
+def _ended(report: dict[str, Any]) -> int:
+    """The exit code; says on stderr what is wrong with the score."""
+    part = report["compared_of_mesh"]
+    if report["score"] is None:
+        print(f"{NAME}: {_NOTHING}; are both in one unit and place?", file=sys.stderr)
+        return EXIT_NOT_REACHED
+    if part < _LEAST_COMPARED:
+        print(
+            f"{NAME}: warning: only {100.0 * part:.2g} % of what is seen of the mesh was compared: the score says "
+            "little (is the reference in the same place? are parts thinner than a few pixels? raise --size)",
+            file=sys.stderr,
+        )
+    return EXIT_OK
 
 
 def format_numbers(report: dict[str, Any]) -> str:
     """The four numbers and the scores of the views as lines of text."""
     width = max(map(len, _ROWS.values()))
-    lines = ["", *(f"  {label:<{width}}  {float(report[key]):>9.4g}" for key, label in _ROWS.items())]
-    if not report["compared"].any():
-        return "\n".join([*lines, "", "nothing to compare: no view shows the mesh on more than a few pixels"])
+    lines = ["", *(f"  {label:<{width}}  {_number(report[key]):>9}" for key, label in _ROWS.items())]
+    if report["score"] is None:
+        return "\n".join([*lines, "", _NOTHING])
     lines += ["", "score by view, and the part of the picture that was compared"]
-    views = zip(report["score_by_view"].tolist(), report["compared"].tolist(), strict=True)
-    lines += [f"  {view + 1:>3}  {value:>9.4g}  {100 * part:>5.1f} %" for view, (value, part) in enumerate(views)]
+    views = zip(report["score_by_view"], report["compared"].tolist(), strict=True)
+    lines += [f"  {view + 1:>3}  {_number(value):>9}  {100 * part:>5.1f} %" for view, (value, part) in enumerate(views)]
     return "\n".join(lines)
+
+
+def _number(value: Any) -> str:
+    return "-" if value is None else f"{float(value):.4g}"
 
 
 def write(

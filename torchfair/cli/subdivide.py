@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from .arguments import non_negative, positive_count
 from .edge_marks import carried, file_of_marks, marks_file
-from .errors import CommandError
 from .inputs import add_repair, read_input
-from .outputs import refuse_existing, refuse_unknown_format
+from .outputs import refuse_existing, refuse_unknown_format, save_result
+from .reading import in_numbers_of, said_of
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -54,7 +54,6 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Reads, refines, writes."""
     from ..boundary import boundary_corners
-    from ..io import save_mesh
     from ..polylines import polylines_along
     from ..subdivision import refine
 
@@ -62,14 +61,15 @@ def run(arguments: argparse.Namespace) -> int:
     refuse_unknown_format(output)
     beside = file_of_marks(output)
     refuse_existing([output], force=arguments.force)
-    mesh = read_input(arguments.input, arguments.repair)
+    mesh = read_input(arguments.input, arguments)
     marks = _marks(arguments, mesh)
     if marks is not None and beside is not None:
         refuse_existing([beside], force=arguments.force)
     scheme: Any = arguments.scheme.replace("-", "_")
     corners = boundary_corners(mesh.vertices, mesh.topology, math.radians(arguments.corner_angle))
-    step = refine(mesh.topology, scheme, arguments.levels, boundary=arguments.boundary, corners=corners)
-    lines, notes = [], [f"repaired: {sentence}" for sentence in mesh.repairs]
+    with in_numbers_of(mesh):
+        step = refine(mesh.topology, scheme, arguments.levels, boundary=arguments.boundary, corners=corners)
+    lines, notes = [], said_of(mesh)
     written = [output]
     output.parent.mkdir(parents=True, exist_ok=True)
     fine = None
@@ -78,7 +78,9 @@ def run(arguments: argparse.Namespace) -> int:
         notes.append(note)
         lines = polylines_along(step.topology, fine) if beside is None else []
     vertices = step.apply(mesh.vertices)
-    save_mesh(output, vertices, step.topology, overwrite=arguments.force, polylines=lines)
+    left_out = save_result(output, vertices, step.topology, mesh, force=arguments.force, polylines=lines,
+        marks=marks is not None)  # fmt: skip
+    notes += [f"note: {note}" for note in left_out]
     if fine is not None and beside is not None:
         from ..io import save_edge_labels
 
@@ -96,6 +98,4 @@ def _marks(arguments: argparse.Namespace, mesh: PolygonMesh) -> Tensor | None:
     file = marks_file(arguments)
     if file is None:
         return None
-    if mesh.repairs:
-        raise CommandError("--repair: marks of edges are for the vertex numbers of the file; write it repaired first")
-    return load_edge_labels(file, mesh.topology)
+    return load_edge_labels(file, mesh.topology, vertex_map=mesh.vertex_map)

@@ -15,16 +15,21 @@ LABELS = {
     "energy_over_curvature": "E/C",
     "angle_variation": "E'",
     "area": "area",
+    "largest_face_area": "largest face area",
+    "longest_edge": "longest edge",
     "smallest_angle_degrees": "smallest angle, degrees",
     "smallest_area_ratio": "smallest face area over its own at the start",
     "largest_area_ratio": "largest face area over its own at the start",
+    "largest_growth": "... or over half the mean, if that is more",
     "flipped_faces": "faces flipped",
     "largest_distance": "largest distance from the reference",
     "largest_distance_relative": "... in mean edges",
     "largest_distance_back": "largest distance back, from the reference",
+    "largest_distance_back_relative": "... in mean edges",
     "largest_boundary_distance": "largest distance from boundary curves",
     "largest_planarity": "largest planarity of kept polygons",
     "largest_planarity_of_all": "largest planarity of all polygons",
+    "largest_planarity_growth": "... growth of that of nearly planar ones",
     "largest_fold_degrees": "largest fold of edges kept flat, degrees",
     "largest_tilt_degrees": "largest angle to a prescribed tangent plane, degrees",
     "largest_cospherical": "largest residual of spheres, relative",
@@ -50,7 +55,14 @@ _ONLY_IN_REPORTS = {
     "stars",
 }
 _IF_ANY = {name for name in LABELS if name.startswith("largest_")} - {"largest_area_ratio", "largest_distance"}
-_IN_PERCENT = ("normal_variation", "total_absolute_curvature", "angle_variation", "area")
+_IN_PERCENT = (
+    "normal_variation",
+    "total_absolute_curvature",
+    "angle_variation",
+    "area",
+    "largest_face_area",
+    "longest_edge",
+)
 
 
 def measures_table(before: Mapping[str, float], after: Mapping[str, float]) -> list[str]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .arguments import count
 from .edge_marks import file_of_marks
-from .inputs import add_handles, add_levels, add_reference, read_handles, read_input, read_reference
+from .inputs import add_handles, add_levels, add_reference, add_repair, read_handles, read_input, read_reference
 from .job_command import JobCommand
 from .outputs import Outputs, Request, Writer
 from .pictures import draw_edges
@@ -79,6 +80,7 @@ class SymmetricCommand(JobCommand):
             "principal polylines through these vertices")  # fmt: skip
         add_levels(parser)
         add_strips(parser)
+        add_repair(parser)
 
     def outputs(self, arguments: argparse.Namespace) -> SymmetricOutputs:
         """See the base class."""
@@ -86,13 +88,12 @@ class SymmetricCommand(JobCommand):
 
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class; quads are cut into triangles."""
-        from ..io import PolygonMesh
-
-        handles, mesh = read_handles(arguments), read_input(arguments.input)
+        mesh = read_input(arguments.input, arguments)
+        handles = read_handles(arguments, mesh)
         if mesh.topology.is_quadrangular:
             edges, vertices, notes = read_quads(arguments, mesh)
             settings = even_settings(self.options().asked(arguments), settings)
-            mesh = PolygonMesh(vertices, edges.topology)
+            mesh = replace(mesh, vertices=vertices, topology=edges.topology, attributes=None)
         else:
             edges, notes = read_principal_edges(arguments, mesh)
         options = {

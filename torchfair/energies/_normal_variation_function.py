@@ -13,12 +13,16 @@ from ..geometry import dual_edge_lengths, edge_lengths
 from ..topology import Topology
 from ._normal_variation_blocks import faces_per_block, tables_of
 from ._normal_variation_kernel import energy_and_gradient
+from ._unit import unit_of
 
 
 def plain_terms(vertices: Tensor, topology: Topology) -> Tensor:
     """``l l*`` (*batch, I) of every interior edge, by differentiable functions of the geometry."""
+    topology.check_vertices(vertices)
+    unit = unit_of(vertices)
+    vertices = vertices / unit[..., None, None]
     lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
-    return lengths * dual_edge_lengths(vertices, topology)
+    return lengths * dual_edge_lengths(vertices, topology) * unit[..., None]
 
 
 def fast_path_serves() -> bool:

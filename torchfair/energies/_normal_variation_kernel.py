@@ -28,6 +28,7 @@ from torch import Tensor
 from ..geometry.normals import DEGENERACY
 from ._normal_variation_blocks import Block, Tables
 from ._normal_variation_memory import Memory
+from ._unit import bring_to_unit
 
 
 def energy_and_gradient(
@@ -39,6 +40,7 @@ def energy_and_gradient(
     """
     with tables.scratch.lend(vertices, _memory_needed(vertices, tables)) as memory:
         positions = memory.take(3, *vertices.shape[:2]).copy_(vertices.movedim(-1, 0))
+        unit = bring_to_unit(positions)
         side_buffer = memory.take(5, vertices.shape[0], tables.most_sides)
         face_buffer = memory.take(4, vertices.shape[0], tables.most_faces)
         normals = memory.take(3, vertices.shape[0], tables.face_count)
@@ -63,7 +65,7 @@ def energy_and_gradient(
                 _scatter(_forces(sides, pull, stretch, out=jumps), block, forces)
         if gradient is not None:
             gradient.copy_(forces.movedim(0, -1))
-    return energy.div_(2)
+    return energy.div_(2).mul_(unit)
 
 
 def _memory_needed(vertices: Tensor, tables: Tables) -> int:

@@ -6,7 +6,17 @@ from torch import Tensor
 
 from ..geometry import dihedral_angles, edge_lengths
 from ..topology import Topology
+from ._unit import unit_of
 from .base import EdgeEnergy, weigh
+
+
+def lengths_times_angles(vertices: Tensor, topology: Topology) -> Tensor:
+    """Length times signed dihedral angle (*batch, I) of every interior edge, for meshes of any size."""
+    topology.check_vertices(vertices)
+    unit = unit_of(vertices)
+    vertices = vertices / unit[..., None, None]
+    lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
+    return lengths * dihedral_angles(vertices, topology) * unit[..., None]
 
 
 def angle_variation_per_edge(vertices: Tensor, topology: Topology, edge_weights: Tensor | None = None) -> Tensor:
@@ -14,8 +24,7 @@ def angle_variation_per_edge(vertices: Tensor, topology: Topology, edge_weights:
 
     Arguments, degenerate cases and errors as for :func:`angle_variation`.
     """
-    lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
-    return weigh(lengths * dihedral_angles(vertices, topology).abs(), edge_weights, topology)
+    return weigh(lengths_times_angles(vertices, topology).abs(), edge_weights, topology)
 
 
 def angle_variation(vertices: Tensor, topology: Topology, edge_weights: Tensor | None = None) -> Tensor:

@@ -13,6 +13,7 @@ from ..errors import TorchfairError
 from ..geometry import tangential_shape_operators, vertex_areas
 from ..geometry.tangential_shape_operator import Estimator, check_estimator
 from ..topology import Topology
+from ._unit import unit_of
 from .base import MeshModule
 from .boundary_extrapolation import BoundaryExtrapolation, boundary_extrapolation
 
@@ -39,13 +40,17 @@ def star_terms(
         TorchfairError: for an unknown estimator or treatment of the boundary.
     """
     extrapolation = tables_for(boundary, topology)
+    topology.check_vertices(vertices)
+    unit = unit_of(vertices)
+    vertices = vertices / unit[..., None, None]
+    unit = torch.ones_like(unit) if per_area else unit  # the rest has the unit of a length, or none
     values = norms(tangential_shape_operators(vertices, topology, estimator=estimator, sine=sine))
     if extrapolation is None and not per_area:
-        return values
+        return values * unit[..., None]
     areas = vertex_areas(vertices, topology)
     if per_area:
         values = values / torch.where(areas > 0, areas, 1.0)
-    return values if extrapolation is None else extrapolation.apply(values, areas)
+    return (values if extrapolation is None else extrapolation.apply(values, areas)) * unit[..., None]
 
 
 def tables_for(boundary: Boundary | BoundaryExtrapolation, topology: Topology) -> BoundaryExtrapolation | None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from ..geometry import dihedral_angles, edge_lengths
 from ..topology import Topology
+from .angle_variation import lengths_times_angles
 from .base import EdgeEnergy, weigh
 
 
@@ -14,8 +14,7 @@ def total_mean_curvature_per_edge(vertices: Tensor, topology: Topology, edge_wei
 
     Arguments, degenerate cases and errors as for :func:`total_mean_curvature`.
     """
-    lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
-    return weigh(lengths * dihedral_angles(vertices, topology) / 2, edge_weights, topology)
+    return weigh(lengths_times_angles(vertices, topology) / 2, edge_weights, topology)
 
 
 def total_mean_curvature(vertices: Tensor, topology: Topology, edge_weights: Tensor | None = None) -> Tensor:

@@ -3,22 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from .directions import Directions
-from .frames import Complexes, FaceFrames, Floats
+from .frames import Complexes, FaceFrames, Floats, Ints
 
 Symmetry = Literal[2, 4]
 
-_BOUNDARY = 1e-4  # weight of the direction of the boundary, which decides where nothing else does
+WEAK = 1e-4
+"""Weight of the direction of curves, such as the boundary, which decides where nothing else does."""
+
 _WEAKEST = 1e-9  # keeps the system regular on closed spheres
 
 
-def direction_field(frames: FaceFrames, directions: Directions, smoothing: float, symmetry: Symmetry) -> Floats:
+class Pull(NamedTuple):
+    """Directions that a field is to follow in some faces, those beside curves.
+
+    Attributes:
+        faces: (n,) their numbers, the same ones several times where they lie beside several curves.
+        angles: (n,) in their frames.
+        weights: (n,) against the smoothness of the field, which has weights about 3.
+    """
+
+    faces: Ints
+    angles: Floats
+    weights: Floats
+
+
+def direction_field(
+    frames: FaceFrames, directions: Directions, smoothing: float, symmetry: Symmetry, pull: Pull | None = None
+) -> Floats:
     r"""Angles (F,) of a field of directions without sign (``symmetry`` 2), or of crosses (4), in the frames.
 
     With ``z`` the ``symmetry``-th power of the direction as a complex number and ``z0`` that of the principal
@@ -34,13 +52,16 @@ def direction_field(frames: FaceFrames, directions: Directions, smoothing: float
         directions: principal directions.
         smoothing: length over which directions are smoothed.
         symmetry: 2 or 4.
+        pull: what else it is to follow.
     """
     size = np.abs(directions.values)
     wanted = (directions.values / np.where(size > 0, size, 1.0)) ** (symmetry // 2)
-    pull = frames.areas * directions.confidence / smoothing**2
-    edge, at_edge = _along_boundary(frames, symmetry)
-    total = pull * wanted + _BOUNDARY * at_edge * edge + _WEAKEST * frames.areas / frames.areas.mean()
-    weights = pull + _BOUNDARY * at_edge + _WEAKEST * frames.areas / frames.areas.mean()
+    trust = frames.areas * directions.confidence / smoothing**2
+    least = _WEAKEST * frames.areas / frames.areas.mean()
+    total, weights = trust * wanted + least, trust + least
+    for faces, angles, strength in (_along_boundary(frames), *([pull] if pull else [])):
+        np.add.at(total, faces, strength * np.exp(1j * symmetry * angles))
+        np.add.at(weights, faces, strength)
     stiffness = connection_laplacian(frames, np.exp(1j * symmetry * frames.turns)) + sp.diags(weights)
     field = hermitian_solver(stiffness)(total)
     return np.asarray(np.angle(field) / symmetry)
@@ -61,15 +82,14 @@ def hermitian_solver(matrix: sp.csr_matrix) -> Callable[[Complexes], Complexes]:
     return lambda right: np.asarray(factor.solve(right))
 
 
-def _along_boundary(frames: FaceFrames, symmetry: int) -> tuple[Complexes, Floats]:
-    """Of every face the power of the direction of its boundary edge, and 1 where it has one, else 0."""
-    faces, side = frames.outer_corners // 3, frames.outer_corners % 3
-    triangles = frames.triangles[faces]
-    every = np.arange(len(faces))
-    along = frames.points[triangles[every, (side + 1) % 3]] - frames.points[triangles[every, side]]
+def side_angles(frames: FaceFrames, corners: Ints) -> Floats:
+    """(n,) angles, in the frames of faces, of their sides that start at corners ``3 f + k``."""
+    faces, side = corners // 3, corners % 3
+    along = frames.points[frames.triangles[faces, (side + 1) % 3]] - frames.points[frames.triangles[faces, side]]
     x, y = ((along * axis[faces]).sum(1) for axis in (frames.first, frames.second))
-    power: Complexes = np.zeros(len(frames.triangles), complex)
-    power[faces] = np.exp(1j * symmetry * np.arctan2(y, x))
-    present = np.zeros(len(frames.triangles))
-    present[faces] = 1.0
-    return power, present
+    return np.asarray(np.arctan2(y, x))
+
+
+def _along_boundary(frames: FaceFrames) -> Pull:
+    corners = frames.outer_corners
+    return Pull(corners // 3, side_angles(frames, corners), np.full(len(corners), WEAK))

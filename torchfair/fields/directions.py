@@ -81,6 +81,11 @@ def carried_directions(directions: Directions, frames: FaceFrames, finer: FaceFr
     slopes = frames.gradients[parents][:, None]
     weights = 1 / 3 + x[..., None] * slopes.real + y[..., None] * slopes.imag
     inside = (weights * directions.at_corners[parents][:, None]).sum(-1)
-    x, y = ((frames.first[parents] * axis).sum(1) for axis in (finer.first, finer.second))
-    at_corners = inside * np.exp(2j * np.arctan2(y, x))[:, None]
+    at_corners = inside * half_turns(frames, finer, parents)[:, None]
     return Directions(at_corners, directions.means[parents], directions.confidence[parents])
+
+
+def half_turns(frames: FaceFrames, finer: FaceFrames, parents: Ints) -> Complexes:
+    """(F',) by what traceless tensors of coarse triangles are multiplied in the frames of finer ones in them."""
+    x, y = ((frames.first[parents] * axis).sum(1) for axis in (finer.first, finer.second))
+    return np.asarray(np.exp(2j * np.arctan2(y, x)))

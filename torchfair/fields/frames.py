@@ -7,8 +7,10 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+import torch
 from torch import Tensor
 
+from .._graph import connected
 from .._one_mesh import one_mesh
 from ..topology import Topology
 
@@ -105,6 +107,21 @@ class FaceFrames:
         edge = self.topology.corner_edges.numpy()[self.outer_corners]
         face[edge], corner[edge] = self.outer_corners // 3, self.outer_corners % 3
         return face, corner
+
+    def joined_corners(self, cut: Bools) -> Ints:
+        """(F, 3) numbers of corners, the same on both sides of interior edges but where they are cut (I,)."""
+        (f, g), (i, j) = self.faces[~cut].T, self.corners[~cut].T
+        ours = np.concatenate([3 * f + i, 3 * f + (i + 1) % 3])
+        theirs = np.concatenate([3 * g + (j + 1) % 3, 3 * g + j])
+        return connected(np.stack([ours, theirs], 1), 3 * len(self.triangles)).reshape(-1, 3)
+
+    def cut_along(self, cut: Bools) -> FaceFrames:
+        """The same triangles, apart from each other where interior edges are cut (I,)."""
+        corners = self.joined_corners(cut)
+        points = np.zeros((int(corners.max()) + 1, 3))
+        points[corners] = self.points[self.triangles]
+        topology = Topology.from_faces(torch.from_numpy(corners), len(points))
+        return FaceFrames.of(torch.from_numpy(points), topology)
 
     @cached_property
     def dual_weights(self) -> Floats:

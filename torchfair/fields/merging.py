@@ -30,6 +30,7 @@ def merge_singularities(
     smoothing: float,
     radius: float,
     symmetry: Symmetry = 4,
+    stay: Bools | None = None,
 ) -> tuple[Floats, Ints]:
     """Merges singular vertices of a field within a radius: opposite ones cancel, negative ones become one.
 
@@ -44,6 +45,7 @@ def merge_singularities(
         smoothing: as for the field.
         radius: along edges.
         symmetry: of the field, 2 or 4.
+        stay: (V,) bool: vertices that are not merged with others; none by default.
 
     Returns:
         Angles (F,) and matchings (I,); those given, where nothing is to be merged.
@@ -54,7 +56,8 @@ def merge_singularities(
     )
     moved, touched = _split(frames, matched, vertex_charges(frames, angles, matched), trust, radius, symmetry)
     for _ in range(_ROUNDS):
-        again, beside = _merged(frames, moved, vertex_charges(frames, angles, moved), trust, radius)
+        charges = vertex_charges(frames, angles, moved)
+        again, beside = _merged(frames, moved, charges if stay is None else np.where(stay, 0, charges), trust, radius)
         if not beside.any():
             break
         moved, touched = again, touched | beside

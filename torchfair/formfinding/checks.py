@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from .._names import PlacedError, few
 from .._numbers import is_number
-from ..errors import MeshError, SettingsError, ShapeError
+from ..errors import SettingsError, ShapeError
 from ..geometry import degenerate_faces
 from ..topology import Topology
 
@@ -30,8 +31,10 @@ def refuse_degenerate_faces(vertices: Tensor, topology: Topology) -> None:
     """Raises MeshError naming the first faces of a mesh (V, 3) that have no area."""
     bad = torch.nonzero(degenerate_faces(vertices, topology)).squeeze(1).tolist()
     if bad:
-        raise MeshError(
-            f"{len(bad)} face(s) have no area: faces {bad[:5]}. Remove them or move their vertices apart first."
+        raise PlacedError(
+            f"{len(bad)} face(s) have no area: faces ",
+            few("face", bad),
+            ". torchfair.repair_mesh (--repair) drops them; or move their vertices apart first.",
         )
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from torch import Tensor
 
-from ..geometry import corner_angles, face_area_vectors
+from ..geometry import corner_angles, dihedral_angles, face_area_vectors
 from ..geometry._ops import dot
 from ..projection.layout import State
 from ..topology import Topology
@@ -21,19 +22,24 @@ class FaceGuard:
         topology: Of the mesh.
         place: The vertices (V, 3) of a state.
         least_angle: Refuses also steps that lead to a smaller corner angle, radians.
+        steepest: Refuses also steps that lead to a larger dihedral angle of either sign, radians.
     """
 
-    def __init__(self, topology: Topology, place: Callable[[State], Tensor], least_angle: float = 0.0) -> None:
-        self._topology, self._place, self._least_angle = topology, place, least_angle
+    def __init__(
+        self, topology: Topology, place: Callable[[State], Tensor], least_angle: float = 0.0, steepest: float = math.pi
+    ) -> None:
+        self._topology, self._place, self._least_angle, self._steepest = topology, place, least_angle, steepest
         self._known: list[tuple[State, Tensor]] = []
 
     def __call__(self, state: State, trial: State) -> bool:
-        """Whether every face of the trial is seen from the side it is seen from in the state."""
+        """Whether every face of the trial is seen from the side it is seen from in the state, within the bounds."""
         if not bool((dot(self._areas(state), self._areas(trial)) > 0.0).all()):
             return False
-        if self._least_angle <= 0.0:
+        if self._least_angle <= 0.0 and self._steepest >= math.pi:
             return True
-        return bool((corner_angles(self._place(trial), self._topology) >= self._least_angle).all())
+        vertices, topology = self._place(trial), self._topology
+        thin = bool((corner_angles(vertices, topology) < self._least_angle).any())
+        return not thin and not bool((dihedral_angles(vertices, topology).abs() > self._steepest).any())
 
     def _areas(self, state: State) -> Tensor:
         for known, areas in self._known:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor
 
+from ..errors import MeshError
 from ..geometry import ReferenceSurface, closest_on
 from ..geometry.reference import Reference, ReferenceFunction
 from ..normalisation import Normalisation
@@ -44,6 +47,53 @@ def surface_of(reference: GivenReference) -> Reference:
         MeshError: a mesh has no face, or vertices that are not finite.
     """
     return ReferenceSurface(*reference) if isinstance(reference, tuple) else reference
+
+
+def refuse_far_reference(reference: GivenReference, vertices: Tensor, topology: Topology, *, most: float) -> None:
+    """Raises MeshError where a reference is too far away to be meant, or the same shape in another unit.
+
+    Args:
+        reference: The surface.
+        vertices: (V, 3) the start, in the same unit, that of its mean edge.
+        topology: Its connectivity; vertices without faces do not count.
+        most: Largest distance of a vertex from the reference; infinity allows everything.
+    """
+    if most == math.inf:
+        return
+    used = vertices[topology.valences > 0]
+    farthest = float(distances_from(surface_of(reference), used).max())
+    words, same = "", False
+    if isinstance(reference, tuple):
+        words, same = _likely_unit(_extents(reference[0][reference[1].valences > 0]), _extents(used))
+    if farthest <= most and not same:
+        return
+    raise MeshError(
+        f"the mesh is up to {farthest:.3g} of its mean edges away from the reference, at most {most:g} are allowed"
+        f"{words}. Bring both to one unit and place, or raise reference_distance (infinity allows everything)"
+    )
+
+
+_UNITS = (10.0, 100.0, 1000.0, 25.4, 2.54, 12.0, 3.2808, 304.8, 30.48, 39.37, 36.0)  # metres, feet, inches and parts
+_ABOUT, _EXACTLY = 1.25, 1.02
+
+
+def _extents(points: Tensor) -> Tensor:
+    return points.amax(0) - points.amin(0)
+
+
+def _likely_unit(theirs: Tensor, ours: Tensor) -> tuple[str, bool]:
+    """Which factor between units explains two sizes (3,), in words, and whether only the unit seems to differ."""
+    ratio = float(torch.linalg.vector_norm(theirs) / torch.linalg.vector_norm(ours))
+    if not 0.0 < ratio < math.inf or 1.0 / _ABOUT < ratio < _ABOUT:
+        return "", False
+    larger, factor = ratio > 1.0, max(ratio, 1.0 / ratio)
+    nearest = min(_UNITS, key=lambda unit: abs(math.log(factor / unit)))
+    words, off = f"; the reference is {factor:.3g} times as {'large' if larger else 'small'}", factor / nearest
+    if not 1.0 / _ABOUT < off < _ABOUT:
+        return words, False
+    alike = bool(((theirs - ratio * ours).abs() <= (_EXACTLY - 1.0) * float(theirs.max())).all())
+    advice = f"{words}, likely another unit: {'divide' if larger else 'multiply'} it by {nearest:g}"
+    return advice, alike and 1.0 / _EXACTLY < off < _EXACTLY
 
 
 def distances_from(reference: Reference, points: Tensor) -> Tensor:

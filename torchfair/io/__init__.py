@@ -16,8 +16,10 @@ from .edge_labels import load_edge_labels as load_edge_labels
 from .edge_labels import save_edge_labels as save_edge_labels
 from .json_text import plain as plain
 from .json_text import to_json as to_json
+from .obj_attributes import ObjAttributes as ObjAttributes
 from .polygon_mesh import PolygonMesh as PolygonMesh
 from .reading import load_mesh as load_mesh
 from .report import versions as versions
 from .report import write_report as write_report
+from .rhino_parts import RhinoParts as RhinoParts
 from .writing import save_mesh as save_mesh

@@ -11,12 +11,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..errors import MeshFileError
 from .closing import cleaned, joined, open_curve
 from .drawn_curves import dxf_pieces, obj_pieces, rhino_pieces
+from .number_table import read_table
 from .raw_mesh import Floats
 from .reading import read_bytes
-from .text import check_text, split_words, to_floats
 
 
 class CurvePoints(NamedTuple):
@@ -36,7 +35,8 @@ class CurvePoints(NamedTuple):
 def load_curve(path: str | os.PathLike[str], *, close: bool = False) -> CurvePoints:
     """Reads a closed curve from text: three numbers a line, x y z, or six with a normal.
 
-    Commas and semicolons count as blanks, # starts a comment.
+    Numbers are set apart by blanks, semicolons or commas; # starts a comment. A comma inside numbers that are set apart
+    otherwise (0,5;0,0;1,5) is a decimal mark, and what could be either is refused.
 
     A line of words before the numbers, such as ``x,y,z``, is passed over. The points may end with the first one
     repeated, or one within 1e-7 of the extent of it, which is left out; so are points that repeat the one before.
@@ -51,24 +51,10 @@ def load_curve(path: str | os.PathLike[str], *, close: bool = False) -> CurvePoi
             are fewer than three points; if it is an open arc that is not to be closed.
     """
     path = Path(path)
-    data = check_text(path, read_bytes(path)).replace(b",", b" ").replace(b";", b" ")
-    lines = [line.split(b"#", 1)[0] for line in data.splitlines()]
-    head = next((number for number, line in enumerate(lines) if line.split()), 0)
-    if lines and lines[head].split() and not _is_number(lines[head].split()[0]):
-        lines[head] = b""
-    text = split_words(b"\n".join(lines))
-    sizes = set(text.sizes.tolist())
-    if not sizes:
-        raise MeshFileError(path, "holds no points")
-    width = int(text.sizes[0])
-    if width not in (3, 6) or len(sizes) > 1:
-        wrong = int(np.flatnonzero(text.sizes != (width if width in (3, 6) else 3))[0])
-        found = int(text.sizes[wrong])
-        raise MeshFileError(path, f"expected three or six numbers in every line, found {found}", int(text.lines[wrong]))
-    rows = to_floats(path, text, np.arange(len(text.words))).reshape(-1, width)
+    rows = read_table(path, read_bytes(path), (3, 6))
     rows, notes = cleaned(path, rows, close=close)
     values = torch.from_numpy(rows.copy())
-    return CurvePoints(values[:, :3], values[:, 3:] if width == 6 else None, tuple(notes))
+    return CurvePoints(values[:, :3], values[:, 3:] if values.shape[1] == 6 else None, tuple(notes))
 
 
 _DRAWINGS: dict[str, Callable[[Path], list[Floats]]] = {".obj": obj_pieces, ".dxf": dxf_pieces, ".3dm": rhino_pieces}
@@ -100,11 +86,3 @@ def load_curves(path: str | os.PathLike[str], *, close: bool = False) -> list[Cu
         points, notes = cleaned(path, rows, close=True)
         result.append(CurvePoints(torch.from_numpy(points.copy()), None, tuple(notes)))
     return result
-
-
-def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

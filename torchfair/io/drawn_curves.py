@@ -24,7 +24,7 @@ def obj_pieces(path: Path) -> list[Floats]:
     """Line elements ``l`` of an OBJ file, as points (n, 3)."""
     data = read_bytes(path)
     text = obj_words(path, data)
-    vertex_rows, line_rows = statement_rows(path, text, b"v", b"l")
+    vertex_rows, line_rows = statement_rows(path, text, (b"v",), (b"l",))
     if not line_rows.size:
         raise MeshFileError(path, "has no line elements (l) that could be a boundary curve")
     first = text.starts[vertex_rows] + 1

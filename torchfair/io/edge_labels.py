@@ -54,12 +54,14 @@ def save_edge_labels(
     atomic_write_text(path, f"{head}\n{pairs}\n]}}\n", overwrite=overwrite)
 
 
-def load_edge_labels(path: str | os.PathLike[str], topology: Topology) -> Tensor:
+def load_edge_labels(path: str | os.PathLike[str], topology: Topology, *, vertex_map: Tensor | None = None) -> Tensor:
     """Marked edges of a file.
 
     Args:
         path: an OBJ file, whose line elements (``l``) run along the edges; or a file of :func:`save_edge_labels`.
-        topology: the mesh with the vertex numbers of the file, so read without repair.
+        topology: the mesh.
+        vertex_map: number in it of each vertex of the file, from ``PolygonMesh.vertex_map``, where it was welded or
+            repaired; marks of edges that this took away are left out.
 
     Returns:
         (E,) bool.
@@ -75,11 +77,12 @@ def load_edge_labels(path: str | os.PathLike[str], topology: Topology) -> Tensor
         raise MeshFileError(path, f"edge labels are read from .obj and .json files. {remedy}")
     data = read_bytes(path)
     num_vertices, pairs, lines = _obj_lines(path, data) if suffix == ".obj" else _json_pairs(path, data)
-    if num_vertices != topology.num_vertices:
+    expected = topology.num_vertices if vertex_map is None else len(vertex_map)
+    if num_vertices != expected:
         raise MeshFileError(
             path,
-            f"its vertices are {num_vertices}, those of the mesh {topology.num_vertices}. "
-            "Edge labels need the mesh with the vertex numbers of the file, without repair",
+            f"its vertices are {num_vertices}, those of the mesh {expected}. "
+            "Edge labels need the mesh with the vertex numbers of the file, or vertex_map where it was repaired",
         )
     first = 1 if suffix == ".obj" else 0
     outside = np.flatnonzero(((pairs < 0) | (pairs >= num_vertices)).any(1))
@@ -87,7 +90,12 @@ def load_edge_labels(path: str | os.PathLike[str], topology: Topology) -> Tensor
         v, w = (pairs[outside[0]] + first).tolist()
         fault = f"marks the edge ({v}, {w}), but the vertices are numbered {first}..{num_vertices - 1 + first}"
         raise MeshFileError(path, fault, _line(lines, outside[0]))
-    numbers = edge_numbers(topology, torch.from_numpy(pairs).to(topology.device))
+    ends = torch.from_numpy(pairs).to(topology.device)
+    if vertex_map is not None:
+        ends = vertex_map.to(topology.device)[ends]
+    numbers = edge_numbers(topology, ends)
+    if vertex_map is not None:
+        numbers = numbers[numbers >= 0]
     missing = torch.nonzero(numbers < 0).squeeze(1).tolist()
     if missing:
         v, w = (pairs[missing[0]] + first).tolist()
@@ -105,7 +113,7 @@ def _line(lines: Ints | None, row: int) -> int | None:
 def _obj_lines(path: Path, data: bytes) -> tuple[int, Ints, Ints]:
     """Number of vertices, steps (n, 2) of the line elements, and where in the file each step stands."""
     text = obj_words(path, data)
-    vertex_rows, rows = statement_rows(path, text, b"v", b"l")
+    vertex_rows, rows = statement_rows(path, text, (b"v",), (b"l",))
     if not rows.size:
         raise MeshFileError(path, "marks no edges: there are no line elements such as l 1 2 3")
     corners, sizes = vertex_numbers(

@@ -1,10 +1,12 @@
 """Wavefront OBJ: vertices and polygons.
 
-Read are ``v x y z`` (colours or a weight behind are ignored) and ``f`` with corners ``v``, ``v/vt``,
-``v//vn`` or ``v/vt/vn``, counted from 1, or from the last vertex backwards if negative. Line elements ``l`` are read
-elsewhere (:func:`torchfair.io.load_edge_labels`). Every other statement of the format is skipped; a word that is none
-of them is an error, because a damaged ``v`` would shift all vertex numbers after it. A backslash at the end of a line
-continues it, except in comments and names, where it ends a Windows path.
+Read are ``v x y z`` (colours or a weight behind are kept beside) and ``f`` (or the old ``fo``) with corners ``v``,
+``v/vt``, ``v//vn`` or ``v/vt/vn``, counted from 1, or from the last vertex backwards if negative. Groups, materials,
+smoothing and texture coordinates are kept beside (:mod:`torchfair.io.obj_attributes`), line elements ``l`` are read
+elsewhere (:func:`torchfair.io.load_edge_labels`). Every other statement of the format, and of material files, is
+skipped; a word that is none of them is an error, because a damaged ``v`` would shift all vertex numbers after it. A
+backslash at the end of a line continues it, except in comments and names, where it ends a Windows path; the sign ^Z of
+old systems ends the file.
 """
 
 from __future__ import annotations
@@ -17,17 +19,21 @@ import numpy as np
 
 from .._ranges import ranges
 from ..errors import MeshFileError
+from .obj_attributes import ObjAttributes, face_statements, read_attributes
 from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
 from .text import Words, check_text, quote, split_words, to_floats, to_ints
 from .text_rows import face_lines, vertex_lines
 
 _SKIPPED = frozenset(
     b"vt vn vp l p g o s mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj ctech "
-    b"stech cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con vc".split()
+    b"stech cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con vc t fo call csh res cdc cdp bzp bsp "
+    b"newmtl Ka Kd Ks Ke Ns Ni Tf Tr d illum sharpness map_Ka map_Kd map_Ks map_Ns map_d map_bump bump disp decal "
+    b"refl".split()
 )
 _VERTEX_SIZES = (3, 4, 6, 7)  # xyz, weight, rgb, both
 _CORNER = re.compile(rb"[-+0-9]*(/[-+0-9]*){0,2}")
-_NAMING = (b"o", b"g", b"usemtl", b"mtllib", b"usemap", b"maplib", b"shadow_obj", b"trace_obj")
+_NAMING = (b"o", b"g", b"usemtl", b"mtllib", b"usemap", b"maplib", b"shadow_obj", b"trace_obj", b"newmtl")
+_END = b"\x1a"  # ^Z
 
 
 def read_obj(path: Path, data: bytes) -> RawMesh:
@@ -37,22 +43,38 @@ def read_obj(path: Path, data: bytes) -> RawMesh:
         MeshFileError: with the line of the fault.
     """
     text = obj_words(path, data)
-    vertex_rows, face_rows = statement_rows(path, text, b"v", b"f")
+    vertex_rows, face_rows = statement_rows(path, text, (b"v",), (b"f", b"fo"))
     points = _read_vertices(path, text, vertex_rows)
+    as_written = [text.words[i] for i in ranges(text.starts[face_rows] + 1, text.sizes[face_rows] - 1).tolist()]
     corners, sizes = vertex_numbers(path, text, vertex_rows, face_rows, slashes=b"/" in data)
     origin = Origin(path, text.lines[vertex_rows], text.lines[face_rows], first_index=1)
-    return assemble(origin, points, corners, sizes)
+    mesh = assemble(origin, points, corners, sizes)
+    attributes = read_attributes(path, text, first_words(text), (vertex_rows, face_rows), as_written)
+    return mesh._replace(attributes=attributes)
 
 
-def write_obj(mesh: RawMesh, polylines: Sequence[Ints] = ()) -> bytes:
+def write_obj(
+    mesh: RawMesh,
+    polylines: Sequence[Ints] = (),
+    attributes: ObjAttributes | None = None,
+    folder: Path | None = None,
+) -> bytes:
     """The bytes of an OBJ file; polylines, two or more vertex numbers each, become line elements."""
     lines = "".join(f"l {' '.join(map(str, (line + 1).tolist()))}\n" for line in polylines)
-    return (vertex_lines(mesh.points, "v ") + face_lines(mesh, prefix="f ", first_index=1) + lines).encode()
+    vertices = vertex_lines(mesh.points, "v ")
+    if attributes is None:
+        return (vertices + face_lines(mesh, prefix="f ", first_index=1) + lines).encode()
+    if attributes.behind:
+        rows = zip(vertices.splitlines(), attributes.behind, strict=True)
+        vertices = "".join(f"{row} {more.decode()}".rstrip() + "\n" for row, more in rows)
+    textures = "".join(f"{line.decode()}\n" for line in attributes.textures)
+    text = vertices + textures + face_statements(mesh, attributes, folder or attributes.folder) + lines
+    return text.encode("utf-8", "surrogateescape")
 
 
 def obj_words(path: Path, data: bytes) -> Words:
     """The words of an OBJ file, statement by statement."""
-    return split_words(_plain_statements(check_text(path, data)))
+    return split_words(_plain_statements(check_text(path, data.partition(_END)[0])))
 
 
 def _plain_statements(data: bytes) -> bytes:
@@ -72,18 +94,23 @@ def _plain_statements(data: bytes) -> bytes:
     return b"\n".join(joined)
 
 
-def statement_rows(path: Path, text: Words, *wanted: bytes) -> list[Ints]:
-    """Lines that begin with each of the ``wanted`` words.
+def first_words(text: Words) -> list[bytes]:
+    """First word of every line."""
+    return [text.words[start] for start in text.starts[:-1].tolist()]
+
+
+def statement_rows(path: Path, text: Words, *wanted: tuple[bytes, ...]) -> list[Ints]:
+    """Lines that begin with one of the words of each of the ``wanted`` kinds.
 
     Raises:
         MeshFileError: if a line begins with a word that the format does not know.
     """
-    keywords = [text.words[start] for start in text.starts[:-1].tolist()]
+    keywords = first_words(text)
     unknown = set(keywords) - _SKIPPED - {b"v", b"f"}
     if unknown:
         row = next(row for row, word in enumerate(keywords) if word in unknown)
         raise MeshFileError(path, f"{quote(keywords[row])} does not start an OBJ statement", int(text.lines[row]))
-    kind_of = dict.fromkeys(keywords, -1) | {word: kind for kind, word in enumerate(wanted)}
+    kind_of = dict.fromkeys(keywords, -1) | {word: kind for kind, words in enumerate(wanted) for word in words}
     kinds = np.fromiter(map(kind_of.__getitem__, keywords), np.int8, len(keywords))
     return [np.flatnonzero(kinds == kind) for kind in range(len(wanted))]
 

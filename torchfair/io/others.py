@@ -10,17 +10,15 @@ import numpy as np
 
 from .._half_edges import first_few
 from ..errors import MeshError, MeshFileError
-from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
+from .raw_mesh import Origin, RawMesh, assemble
+from .stl import write_stl
 
-READ = (".stl", ".glb", ".gltf", ".dae", ".3mf")
+READ = (".glb", ".gltf", ".dae", ".3mf")
 WRITTEN = (".stl", ".glb")
 
 
 def read_other(path: Path) -> RawMesh:
     """Mesh of a file that trimesh knows, with ``process=False``: vertices and faces as trimesh finds them.
-
-    STL files hold loose triangles; there, and only there, corners at exactly the same position become one
-    vertex (numbered in order of first use), since no topology would be left otherwise.
 
     Raises:
         MeshFileError: whatever trimesh raises.
@@ -36,21 +34,7 @@ def read_other(path: Path) -> RawMesh:
     except Exception as error:  # trimesh lets through whatever its parsers raise
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise MeshFileError(path, f"trimesh cannot read it ({reason})") from None
-    if path.suffix.lower() == ".stl":
-        points, faces = _merge_equal(points, faces)
     return assemble(Origin(path), points, faces.ravel(), np.full(len(faces), 3, np.int64))
-
-
-def _merge_equal(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """One vertex for each distinct position, in order of first use."""
-    order = np.lexsort(points.T)
-    new = np.append(True, (np.diff(points[order], axis=0) != 0).any(axis=1))[: order.size]
-    group = np.empty(order.size, np.int64)
-    group[order] = np.cumsum(new) - 1
-    first = order[new]  # the sort is stable, so this is the first use
-    rank = np.empty(first.size, np.int64)
-    rank[np.argsort(first)] = np.arange(first.size)
-    return points[np.sort(first)], rank[group][faces]
 
 
 def write_other(mesh: RawMesh, suffix: str) -> bytes:
@@ -66,6 +50,8 @@ def write_other(mesh: RawMesh, suffix: str) -> bytes:
             f"{suffix} files hold triangles only, but {others.size} face(s) are not: faces "
             f"{first_few(others, others.size)}. Write OBJ, OFF or PLY, or triangulate first."
         )
+    if suffix == ".stl":
+        return write_stl(mesh)
     import trimesh
 
     surface = trimesh.Trimesh(mesh.points, mesh.corners.reshape(-1, 3), process=False)

@@ -1,25 +1,29 @@
 """Stanford PLY, as text and in both binary byte orders: vertices and polygons.
 
 Read are ``x, y, z`` of the element ``vertex`` and the list ``vertex_indices`` (or ``vertex_index``) of the
-element ``face``; every other property and element is skipped. Written are float64 positions.
+element ``face``, or of ``tristrips``; every other property and element is skipped, and a note names those, and what
+follows the last element. Rows of text may be spread over lines in any way. Written are float64 positions.
 """
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from .._names import first_few
 from ..errors import MeshFileError
 from .ply_header import Element, Header, read_header
-from .ply_rows import Column, read_binary_rows, read_text_rows
+from .ply_rows import Column, read_binary_rows, read_loose_rows, read_text_rows
 from .raw_mesh import Ints, Origin, RawMesh, assemble
-from .text import check_text, split_words
+from .text import Words, check_text, split_words
 from .text_rows import face_lines, vertex_lines
 
 Bytes = npt.NDArray[np.uint8]
 
+_STRIPS = "tristrips"
 _COLORS = ("red", "green", "blue")
 
 
@@ -31,27 +35,67 @@ def read_ply(path: Path, data: bytes) -> RawMesh:
     """
     header = read_header(path, data)
     wanted = _wanted_properties(path, header)
+    faces = "face" if "face" in wanted else _STRIPS
     if header.byte_order:
-        columns = _read_binary(path, data, header, wanted)
+        columns, more = _read_binary(path, data, header, wanted)
         origin = Origin(path)
     else:
-        columns, lines = _read_text(path, data, header, wanted)
-        origin = Origin(path, lines["vertex"], lines["face"])
+        columns, lines, more = _read_text(path, data, header, wanted)
+        origin = Origin(path, lines["vertex"], lines[faces])
     points = np.stack([values for values, _ in columns["vertex"]], axis=1).astype(np.float64)
-    corners, sizes = columns["face"][0]
-    return assemble(origin, points, corners.astype(np.int64), sizes)
+    corners, sizes = columns[faces][0]
+    corners = corners.astype(np.int64)
+    if faces == _STRIPS:
+        corners, sizes, strips = _cut_strips(corners, sizes)
+        if origin.face_lines is not None:
+            origin = origin._replace(face_lines=origin.face_lines[strips])
+    mesh = assemble(origin, points, corners, sizes)
+    return mesh._replace(notes=(*more, *_skipped(header, wanted)))
+
+
+def _skipped(header: Header, wanted: dict[str, list[int]]) -> list[str]:
+    """A note that names what was not read, if anything."""
+    names = []
+    for element in header.elements:
+        if element.count and element.name not in wanted:
+            names.append(f"element {element.name}")
+        elif element.count:
+            taken = wanted[element.name]
+            names += [f"{element.name} {item.name}" for i, item in enumerate(element.properties) if i not in taken]
+    return [f"left out of the file: {first_few(names, len(names))}"] if names else []
+
+
+def _cut_strips(numbers: Ints, sizes: Ints) -> tuple[Ints, Ints, Ints]:
+    """Triangles of strips, which -1 sets apart: their corners, their sizes, and the row of each.
+
+    Every other triangle of a strip is turned over; those that come twice to a vertex only lead on to the next one.
+    """
+    rows = np.repeat(np.arange(len(sizes)), sizes)
+    first = np.arange(max(len(numbers) - 2, 0))
+    whole = (
+        (rows[first] == rows[first + 2]) & (numbers[first] >= 0) & (numbers[first + 1] >= 0) & (numbers[first + 2] >= 0)
+    )
+    begins = np.append(True, (rows[1:] != rows[:-1]) | (numbers[:-1] < 0))[: len(numbers)]
+    start = np.maximum.accumulate(np.where(begins, np.arange(len(numbers)), 0))
+    first = first[whole]
+    odd = (first - start[first]) % 2
+    a, b, c = numbers[first], numbers[first + 1 + odd], numbers[first + 2 - odd]
+    proper = (a != b) & (b != c) & (c != a)
+    corners = np.stack([a, b, c], axis=1)[proper]
+    return corners.ravel(), np.full(len(corners), 3), rows[first][proper]
 
 
 def _wanted_properties(path: Path, header: Header) -> dict[str, list[int]]:
     """Positions of the properties to read, for the elements ``vertex`` and ``face``."""
     elements = {element.name: element for element in header.elements}
-    for name in ("vertex", "face"):
+    faces = _STRIPS if _STRIPS in elements and "face" not in elements else "face"
+    for name in ("vertex", faces):
         if name not in elements:
             found = ", ".join(elements) or "none"
             raise MeshFileError(path, f"the header has no element '{name}' (elements: {found})", header.num_lines)
     coordinates = [_find(path, header, elements["vertex"], False, axis) for axis in "xyz"]
-    corners = _find(path, header, elements["face"], True, "vertex_indices", "vertex_index")
-    return {"vertex": coordinates, "face": [corners]}
+    corners = _find(path, header, elements[faces], True, "vertex_indices", "vertex_index")
+    return {"vertex": coordinates, faces: [corners]}
 
 
 def _find(path: Path, header: Header, element: Element, is_list: bool, *names: str) -> int:
@@ -64,22 +108,54 @@ def _find(path: Path, header: Header, element: Element, is_list: bool, *names: s
     raise MeshFileError(path, f"element '{element.name}' has no {kind} '{names[0]}'", header.num_lines)
 
 
-def _read_binary(path: Path, data: bytes, header: Header, wanted: dict[str, list[int]]) -> dict[str, list[Column]]:
+def _read_binary(
+    path: Path, data: bytes, header: Header, wanted: dict[str, list[int]]
+) -> tuple[dict[str, list[Column]], list[str]]:
     columns = {}
     position = header.body_start
     for element in header.elements:
         columns[element.name], position = read_binary_rows(path, data, position, element, wanted.get(element.name, []))
-    if data[position:].strip():
-        raise MeshFileError(path, f"{len(data) - position} bytes follow the last element that the header promises")
-    return columns
+    return columns, [_more(f"{len(data) - position} byte(s)")] if data[position:].strip() else []
+
+
+def _more(what: str) -> str:
+    return f"{what} behind the last element that the header promises are not read"
 
 
 def _read_text(
     path: Path, data: bytes, header: Header, wanted: dict[str, list[int]]
-) -> tuple[dict[str, list[Column]], dict[str, Ints]]:
-    """Columns, and line numbers of the rows, of every element."""
+) -> tuple[dict[str, list[Column]], dict[str, Ints], list[str]]:
+    """Columns, and line numbers of the rows, of every element; and a note if there is more."""
     check_text(path, data)
     text = split_words(data[header.body_start :], header.num_lines + 1)
+    try:
+        return _read_lines(path, text, header, wanted)
+    except MeshFileError:
+        with contextlib.suppress(MeshFileError):
+            loose = _read_loose(path, text, header, wanted)
+            if loose is not None:
+                return loose
+        raise
+
+
+def _read_loose(
+    path: Path, text: Words, header: Header, wanted: dict[str, list[int]]
+) -> tuple[dict[str, list[Column]], dict[str, Ints], list[str]] | None:
+    """What :func:`_read_text` gives of a file whose rows are not lines; None if its numbers do not add up."""
+    columns, lines, place = {}, {}, 0
+    for element in header.elements:
+        if element.count > len(text.words):
+            return None
+        found = read_loose_rows(path, text, place, element, wanted.get(element.name, []))
+        if found is None:
+            return None
+        columns[element.name], lines[element.name], place = found
+    return (columns, lines, []) if place == len(text.words) else None
+
+
+def _read_lines(
+    path: Path, text: Words, header: Header, wanted: dict[str, list[int]]
+) -> tuple[dict[str, list[Column]], dict[str, Ints], list[str]]:
     columns, element_lines = {}, {}
     taken, available = 0, len(text.lines)
     for element in header.elements:
@@ -91,9 +167,8 @@ def _read_text(
         element_lines[element.name] = rows.lines
         columns[element.name] = read_text_rows(path, rows, element, wanted.get(element.name, []))
         taken = end
-    if taken < available:
-        raise MeshFileError(path, "more rows follow than the header promises", int(text.lines[taken]))
-    return columns, element_lines
+    more = [_more(f"{available - taken} line(s), from line {text.lines[taken]} on,")] if taken < available else []
+    return columns, element_lines, more
 
 
 def write_ply(mesh: RawMesh, *, binary: bool = False, colors: Bytes | None = None) -> bytes:

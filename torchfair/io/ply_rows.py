@@ -22,7 +22,7 @@ from .text import Words, to_floats, to_ints
 
 Numbers = npt.NDArray[Any]  # in the type of the file
 Column = tuple[Numbers, Ints]
-_STRUCT_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I"}
+_STRUCT_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q"}
 
 
 def read_binary_rows(
@@ -114,6 +114,38 @@ def read_text_rows(path: Path, text: Words, element: Element, wanted: Sequence[i
         position = position + sizes
     _check_row_ends(path, text, element, position == ends)
     return [columns[i] for i in wanted]
+
+
+def read_loose_rows(
+    path: Path, text: Words, place: int, element: Element, wanted: Sequence[int]
+) -> tuple[list[Column], Ints, int] | None:
+    """Columns of the ``wanted`` properties, line of every row, and the word behind the last one.
+
+    Rows may begin and end anywhere in a line. None if there are not enough words, or a length is no whole number.
+    """
+    starts: list[int] = []
+    sizes: list[int] = []
+    for _ in range(element.count if element.properties else 0):
+        for item in element.properties:
+            size = 1
+            if item.count_type is not None:
+                if place >= len(text.words) or not text.words[place].isdigit() or len(text.words[place]) > 18:
+                    return None
+                size = int(text.words[place])
+                place += 1
+            starts.append(place)
+            sizes.append(size)
+            place += size
+        if place > len(text.words):
+            return None
+    shape = (-1, max(len(element.properties), 1))
+    at, counts = np.asarray(starts, np.int64).reshape(shape), np.asarray(sizes, np.int64).reshape(shape)
+    columns = []
+    for i in wanted:
+        convert = to_floats if "f" in element.properties[i].type else to_ints
+        columns.append((convert(path, text, ranges(at[:, i], counts[:, i])), counts[:, i]))
+    lines = text.lines[np.searchsorted(text.starts, at[:, 0], side="right") - 1]
+    return columns, lines, place
 
 
 def _check_row_ends(path: Path, text: Words, element: Element, good: npt.NDArray[np.bool_]) -> None:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from .._names import FROM_ZERO, Names
+from .._names import Ints as Ints
 from ..errors import MeshFileError
 
-Ints = npt.NDArray[np.int64]
+if TYPE_CHECKING:
+    from .obj_attributes import ObjAttributes
+    from .rhino_parts import RhinoParts
+
 Floats = npt.NDArray[np.float64]
-
-
-class RawMesh(NamedTuple):
-    """Points and packed faces in file order; face ``i`` is ``corners[offsets[i]:offsets[i + 1]]``."""
-
-    points: Floats  # (V, 3)
-    corners: Ints  # vertex numbers from zero
-    offsets: Ints  # (F+1,)
 
 
 class Origin(NamedTuple):
@@ -29,6 +26,21 @@ class Origin(NamedTuple):
     vertex_lines: Ints | None = None  # line of each vertex; None in binary files
     face_lines: Ints | None = None
     first_index: int = 0  # how the format counts vertices
+
+    def names(self) -> Names:
+        """What vertices and faces are called."""
+        return Names(self.first_index, face_lines=self.face_lines)
+
+
+class RawMesh(NamedTuple):
+    """Points and packed faces in file order; face ``i`` is ``corners[offsets[i]:offsets[i + 1]]``."""
+
+    points: Floats  # (V, 3)
+    corners: Ints  # vertex numbers from zero
+    offsets: Ints  # (F+1,)
+    names: Names = FROM_ZERO
+    notes: tuple[str, ...] = ()  # what was left out, or read in spite of a fault
+    attributes: ObjAttributes | RhinoParts | None = None  # of OBJ and 3DM files
 
 
 def assemble(origin: Origin, points: Floats, corners: Ints, sizes: Ints) -> RawMesh:
@@ -60,7 +72,7 @@ def assemble(origin: Origin, points: Floats, corners: Ints, sizes: Ints) -> RawM
             f"but the vertices are numbered {first}..{len(points) - 1 + first}"
         )
         raise MeshFileError(origin.path, fault, _line(origin.face_lines, face))
-    return RawMesh(points, corners, offsets)
+    return RawMesh(points, corners, offsets, origin.names())
 
 
 def _line(lines: Ints | None, row: int) -> int | None:

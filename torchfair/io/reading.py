@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import torch
 
-from ..errors import MeshError, MeshFileError
-from ..repair import repair_packed
+from .._names import PlacedError
+from ..errors import MeshFileError
+from ..repair import coincident_edges, repair_packed, weld_packed
 from ..topology import Topology
 from . import others
 from .obj import read_obj
@@ -17,42 +20,99 @@ from .off import read_off
 from .ply import read_ply
 from .polygon_mesh import PolygonMesh
 from .raw_mesh import RawMesh
+from .rhino import read_rhino
+from .stl import read_stl
 
-_READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
+_READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+    ".3dm": read_rhino,
+}
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"PK\x03\x04": "zip", b"BZh": "bzip2", b"\xfd7zXZ\0": "xz"}
-_REMEDY = (
-    "Reading with repair=True (--repair on the command line) re-orients faces and drops unused vertices, "
-    "where that is enough"
-)
 
 
-def load_mesh(path: str | os.PathLike[str], *, repair: bool = False) -> PolygonMesh:
+def load_mesh(
+    path: str | os.PathLike[str], *, repair: bool = False, weld: bool | float = False, split_edges: bool = False
+) -> PolygonMesh:
     """The polygon mesh of a file.
 
-    The format follows from the extension, upper or lower case. OBJ, OFF and PLY (text and binary) keep
-    polygons, vertex order and orientation exactly. STL, GLB, GLTF, DAE and 3MF go through trimesh with
-    ``process=False``, and corners of STL files at exactly the same position become one vertex. Vertices that
-    no face uses are legal.
+    The format follows from the extension, upper or lower case. OBJ, OFF and PLY (text and binary) keep polygons, vertex
+    order and orientation exactly. Corners of STL files at the same position become one vertex where an edge joins them.
+    3DM files hold their visible meshes in one (with the package rhino3dm). GLB, GLTF, DAE and 3MF go through trimesh
+    with ``process=False``. Vertices that no face uses are legal. Edges of the boundary that lie on each other are told
+    in ``PolygonMesh.notes``.
 
     Args:
         path: the file.
         repair: whether to pass the mesh through :func:`torchfair.repair_mesh`; what that did is in
-            ``PolygonMesh.repairs``.
+            ``PolygonMesh.repairs``, in the numbers of the file.
+        weld: whether edges of the boundary at the same place become one, see :func:`torchfair.repair_mesh`: True, or
+            the largest distance in the unit of the file. Without ``repair`` nothing else is done.
+        split_edges: whether to repair, and to split edges of more than two faces, too.
 
     Raises:
-        MeshFileError: the only error, for every fault of the file and of its mesh, with the line number
-            where there is one.
+        MeshFileError: for every fault of the file and of its mesh, with the line number where there is one, in the
+            numbers of the file (from 1 in OBJ files), with what mends it.
+        SettingsError: ``weld`` is no distance.
+        TorchfairError: rhino3dm, which reads 3DM files, is not installed.
     """
     path = Path(path)
     raw = _read_raw(path)
-    vertices = torch.from_numpy(raw.points)
+    repair = repair or split_edges
     try:
+        mesh = _made(raw, repair, weld, split_edges)
+    except PlacedError as error:
+        first = error.sentence.face
+        fault = f"{error.sentence.told(raw.names)}{_remedy(raw, repair, weld, split_edges)}"
+        raise MeshFileError(path, fault, None if first is None else raw.names.line(first)) from None
+    if not mesh.topology.num_faces:
+        raise MeshFileError(path, "no face is left of the mesh: " + " ".join(mesh.repairs))
+    return mesh
+
+
+def _made(raw: RawMesh, repair: bool, weld: bool | float, split_edges: bool) -> PolygonMesh:
+    vertices = torch.from_numpy(raw.points)
+    faces = raw.corners, raw.offsets
+    if not repair and weld is False:
+        mesh = PolygonMesh(vertices, Topology.from_packed_faces(*faces, len(raw.points)), (), raw.notes, raw.names)
+        mesh = replace(mesh, attributes=raw.attributes)
+    else:
         if repair:
-            repaired = repair_packed(vertices, raw.corners, raw.offsets)
-            return PolygonMesh(repaired.vertices, repaired.topology, tuple(repaired.messages))
-        return PolygonMesh(vertices, Topology.from_packed_faces(raw.corners, raw.offsets, len(raw.points)))
-    except MeshError as error:
-        raise MeshFileError(path, str(error) if repair else f"{error} {_REMEDY}.") from None
+            mended = repair_packed(vertices, *faces, weld=weld, split_edges=split_edges)
+        else:
+            mended = weld_packed(vertices, *faces, weld)
+        kept = [part.numpy() for part in (mended.kept_vertices, mended.kept_faces, mended.kept_corners)]
+        same = len(kept[0]) == len(raw.points) and bool((kept[0] == np.arange(len(kept[0]))).all())
+        mesh = PolygonMesh(
+            mended.vertices,
+            mended.topology,
+            tuple(sentence.told(raw.names) for sentence in mended.sentences),
+            raw.notes,
+            replace(raw.names, vertices=kept[0], faces=kept[1]),
+            None if same else mended.vertex_map,
+            raw.attributes and raw.attributes.of_repaired(*kept),
+        )
+    seams = coincident_edges(mesh.vertices, mesh.topology)
+    if seams is None:
+        return mesh
+    hint = " weld=True (--weld on the command line) joins them." if weld is False else ""
+    return replace(mesh, notes=(*mesh.notes, seams.told(mesh.names) + hint))
+
+
+def _remedy(raw: RawMesh, repair: bool, weld: bool | float, split_edges: bool) -> str:
+    """How to read the file after all; empty if no repair mends it."""
+    ways = [] if repair else [(False, "repair=True (--repair on the command line)")]
+    ways += [] if split_edges else [(True, "split_edges=True (--split-edges on the command line)")]
+    for split, words in ways:
+        try:
+            mended = _made(raw, True, weld, split)
+        except PlacedError:
+            continue
+        if mended.topology.num_faces:
+            return f" {words} mends this: {' '.join(mended.repairs)}"
+    return ""
 
 
 def _read_raw(path: Path) -> RawMesh:

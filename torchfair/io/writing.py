@@ -16,9 +16,12 @@ from ..topology import Topology
 from . import others
 from .atomic import atomic_write_bytes
 from .obj import write_obj
+from .obj_attributes import ObjAttributes
 from .off import write_off
 from .ply import Bytes, write_ply
 from .raw_mesh import Ints, RawMesh
+from .rhino import write_rhino
+from .rhino_parts import RhinoParts
 
 
 def save_mesh(
@@ -30,12 +33,14 @@ def save_mesh(
     binary: bool = False,
     polylines: Sequence[Tensor] = (),
     colors: Tensor | None = None,
+    attributes: ObjAttributes | RhinoParts | None = None,
 ) -> None:
     """Writes a polygon mesh; the file appears whole or not at all.
 
     The format follows from the extension. OBJ, OFF and PLY keep polygons, vertex order and orientation; their
-    text holds the shortest digits that read back to the same float64. STL and GLB go through trimesh: triangles
-    only, in single precision.
+    text holds the shortest digits that read back to the same float64. 3DM files (with the package rhino3dm) are in
+    double precision, too; polygons of more than four corners are triangles there, which are read back as polygons. STL
+    and GLB hold triangles only, in single precision.
 
     Args:
         path: the file; its folder must exist.
@@ -46,6 +51,9 @@ def save_mesh(
         binary: whether to write PLY in (little-endian) binary.
         polylines: OBJ files only: vertex numbers, two or more each, that are written as line elements, such as from
             ``PrincipalEdges.polylines``; :func:`load_edge_labels` reads the edges back.
+        attributes: groups, materials, texture coordinates and colours of an OBJ file, or unit, layers and names of a
+            3DM file, as they were read (:attr:`PolygonMesh.attributes`), which are written back; the mesh must have the
+            same faces.
         colors: PLY files only: (V, 3) red, green and blue of every vertex, 0 to 1.
 
     Raises:
@@ -56,7 +64,7 @@ def save_mesh(
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    known = (".obj", ".off", ".ply", *others.WRITTEN)
+    known = (".obj", ".off", ".ply", ".3dm", *others.WRITTEN)
     if suffix not in known:
         raise MeshFileError(path, f"cannot write the format {suffix or '(none)'}. Known are {', '.join(known)}")
     if binary and suffix != ".ply":
@@ -65,9 +73,16 @@ def save_mesh(
         raise MeshFileError(path, "only OBJ files hold polylines. Use save_edge_labels beside files of other formats")
     if colors is not None and suffix != ".ply":
         raise MeshFileError(path, "only PLY files hold colours here. Leave out colors")
+    if attributes is not None and not isinstance(attributes, _ATTRIBUTES.get(suffix, ())):
+        raise MeshFileError(path, "its attributes are not those of such a file. Leave out attributes")
     mesh = _raw_mesh(vertices, topology)
+    if attributes is not None:
+        _check_fit(mesh, attributes)
     if suffix == ".obj":
-        data = write_obj(mesh, [_line_points(line, topology) for line in polylines])
+        lines = [_line_points(line, topology) for line in polylines]
+        data = write_obj(mesh, lines, attributes if isinstance(attributes, ObjAttributes) else None, path.parent)
+    elif suffix == ".3dm":
+        data = write_rhino(mesh, attributes if isinstance(attributes, RhinoParts) else None)
     elif suffix == ".off":
         data = write_off(mesh)
     elif suffix == ".ply":
@@ -91,6 +106,24 @@ def _raw_mesh(vertices: Tensor, topology: Topology) -> RawMesh:
             "Nothing was written."
         )
     return RawMesh(points, topology.corners.cpu().numpy(), topology.face_offsets.cpu().numpy())
+
+
+_ATTRIBUTES: dict[str, type] = {".obj": ObjAttributes, ".3dm": RhinoParts}
+
+
+def _check_fit(mesh: RawMesh, attributes: ObjAttributes | RhinoParts) -> None:
+    if isinstance(attributes, RhinoParts):
+        fits = len(attributes.owners) == len(mesh.offsets) - 1
+    else:
+        fits = _fits_obj(mesh, attributes)
+    if not fits:
+        raise MeshError("attributes: they are those of a mesh with other vertices or faces. Leave them out")
+
+
+def _fits_obj(mesh: RawMesh, attributes: ObjAttributes) -> bool:
+    fits = len(attributes.behind) in (0, len(mesh.points))
+    fits = fits and attributes.corner_textures.size in (0, len(mesh.corners))
+    return fits and all(place < len(mesh.offsets) for place, _ in attributes.statements)
 
 
 def _bytes(colors: Tensor, topology: Topology) -> Bytes:

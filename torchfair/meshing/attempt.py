@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from ..boundary import boundary_corners
 from ..errors import MeshError
 from ..fields.frames import Floats, Ints
 from .boundary_cells import Compact, compact, tidy_boundary
-from .boundary_runs import BoundaryRun, find_runs, inward_moves
-from .crossings import off_the_lines
+from .boundary_runs import BoundaryRun, find_runs
+from .crease_runs import crease_lines
+from .creases import Creases
 from .cut_graph import CutGraph
 from .integers import split_integers
 from .lattice import Lattice
+from .off_lines import off_the_lines
 from .relaxation import loosened, stretched
 from .seamless_map import MapProblem, SeamlessMap
-from .seams import find_seams
+from .seams import Seams, find_seams
 from .settings import MeshingSettings
 from .surface import DesignSurface
 from .tracing import Cells, trace_cells
@@ -36,12 +40,14 @@ class Plan:
     Attributes:
         spacing: length of edges.
         smoothing: length over which directions are smoothed.
-        align: whether boundary runs become lines.
+        align: whether boundary runs and creases become lines.
+        creases: whether creases are kept at all.
     """
 
     spacing: float
     smoothing: float
     align: bool
+    creases: bool = True
 
 
 class FailedAttemptError(MeshError):
@@ -65,42 +71,48 @@ class PieceMesh:
         positions: (N, 3).
         faces: nodes counterclockwise.
         rows: pairs of nodes, edges with the second coordinate constant.
+        creases: (C, 2) nodes of the edges along creases.
+        sharp: (n, 2, 3) ends of the edges of the surface that they stand for.
         singular_places, singular_charges: of the field.
     """
 
     positions: Floats
     faces: list[list[int]]
     rows: set[tuple[int, int]]
+    creases: Ints
+    sharp: Floats
     singular_places: Floats
     singular_charges: Ints
 
 
 def attempt(
-    surface: DesignSurface, graph: CutGraph, lattice: Lattice, plan: Plan, settings: MeshingSettings
+    surface: DesignSurface, creases: Creases, graph: CutGraph, lattice: Lattice, plan: Plan, settings: MeshingSettings
 ) -> PieceMesh:
-    """Meshes a component as planned, cut open with the field of the plan.
+    """Meshes a component with creases as planned, cut open with the field of the plan.
 
     Raises:
         FailedAttemptError: if that gives no valid mesh.
     """
     frames = surface.frames
-    runs: list[BoundaryRun] = []
-    if plan.align:
-        shortest = _SHORTEST_RUN * plan.spacing
-        runs = find_runs(frames, graph, settings.boundary_angle, shortest, lattice.aligned)
-    corners = boundary_corners(surface.vertices, surface.topology, settings.corner_angle).numpy()
-    found = _map(surface, graph, lattice, plan, runs)
-    inward = inward_moves(found.seams, found.values, frames.triangles, runs)
+    seams = find_seams(frames, graph)
+    spacings = _spacings(surface, graph, plan)
+    shortest, components = _SHORTEST_RUN * spacings.max(1), lattice.aligned if plan.align else ()
+    lines = crease_lines(frames, graph, seams, creases, settings.boundary_angle, shortest, components)
+    graph = replace(graph, nodes=graph.nodes | lines.pinned)
+    runs = find_runs(frames, graph, settings.boundary_angle, shortest, components) if settings.align_boundary else []
+    corners = boundary_corners(surface.vertices, surface.topology, settings.corner_angle).numpy() | creases.corners
+    found = _map(surface, graph, seams, lattice, spacings, [*runs, *itertools.chain(*lines.runs)])
     try:
-        cells = trace_cells(found, off_the_lines(found, inward), corners)
-        area = lattice.cell * plan.spacing**2
-        whole = compact(tidy_boundary(cells, plan.spacing, area))
+        cells = trace_cells(found, off_the_lines(found, runs, lines), corners & ~graph.nodes, lines)
+        near = spacings[KDTree(frames.centres).query(cells.positions)[1]] if surface.sizes else spacings[:1]
+        whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1)))
         verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None
     singular = np.flatnonzero(graph.charges)
     places, charges = frames.points[singular], graph.charges[singular]
-    return PieceMesh(whole.positions, whole.faces, _rows(cells, whole), places, charges)
+    sharp = frames.points[frames.edges[creases.edges]]
+    return PieceMesh(whole.positions, whole.faces, _rows(cells, whole), whole.creases, sharp, places, charges)
 
 
 def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
@@ -115,10 +127,18 @@ def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
     return {(int(a), int(b)) for a, b in numbered if 0 <= a < b}
 
 
-def _map(surface: DesignSurface, graph: CutGraph, lattice: Lattice, plan: Plan, runs: list[BoundaryRun]) -> SeamlessMap:
+def _spacings(surface: DesignSurface, graph: CutGraph, plan: Plan) -> Floats:
+    """(F, 2) lengths of edges along the field and across, but for those of the lattice."""
+    if surface.sizes is None:
+        return np.full((len(surface.frames.areas), 2), plan.spacing)
+    return np.asarray(plan.spacing * np.exp(surface.sizes.along(graph.angles)))
+
+
+def _map(
+    surface: DesignSurface, graph: CutGraph, seams: Seams, lattice: Lattice, spacings: Floats, runs: list[BoundaryRun]
+) -> SeamlessMap:
     """A map that is one to one near every point."""
     frames = surface.frames
-    seams = find_seams(frames, graph)
     count = len(frames.triangles)
     problem = MapProblem(
         frames=frames,
@@ -126,7 +146,7 @@ def _map(surface: DesignSurface, graph: CutGraph, lattice: Lattice, plan: Plan, 
         seams=seams,
         split=split_integers(frames, graph, seams, runs),
         shear=lattice.matrix,
-        density=np.tile(1 / (plan.spacing * np.array(lattice.spacings)), (count, 1)),
+        density=1 / (spacings * lattice.spacings),
         anisotropy=np.full(count, _ANISOTROPY),
     )
     wanted, problem = problem.density, stretched(problem)

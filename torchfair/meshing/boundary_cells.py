@@ -1,4 +1,4 @@
-"""Cells that the boundary clips, made fit for use: no short edges, no slivers."""
+"""Cells that the boundary and creases clip, made fit for use: no short edges, no slivers."""
 
 from __future__ import annotations
 
@@ -15,45 +15,51 @@ _SMALL = 0.08  # area of faces at the boundary, over that of full cells
 _ROUNDS = 8
 
 
-def tidy_boundary(cells: Cells, spacing: float, area: float) -> PolygonEdits:
-    """Collapses short edges at the boundary and joins slivers with their neighbours, each change checked.
+def tidy_boundary(cells: Cells, spacing: float | Floats, area: float | Floats) -> PolygonEdits:
+    """Collapses short edges at the boundary and at creases and joins slivers with neighbours, each change checked.
 
     Args:
         cells: of a map.
-        spacing: length of edges.
-        area: of full cells.
+        spacing: length of edges, also (N,) at the nodes.
+        area: of full cells, also (N,).
 
     Returns:
         The polygons; positions that no face uses are among theirs.
     """
     faces = [face for face in cells.faces if len(face) > 2]  # bulges of the boundary over one line
-    edits = PolygonEdits(cells.positions.copy(), faces, cells.on_boundary.copy(), cells.is_corner | cells.singular)
+    edits = PolygonEdits(cells.positions, faces, cells.on_boundary, cells.fixed, cells.creases)
+    shortest = np.broadcast_to(_SHORT * np.asarray(spacing), len(cells.positions))
+    smallest = np.broadcast_to(_SMALL * np.asarray(area), len(cells.positions))
     for _ in range(_ROUNDS):
-        for number in edits.boundary_faces():
+        for number in edits.curve_faces():
             edits.drop_straight_nodes(number)
-        if not _collapse_short(edits, _SHORT * spacing) + _join_small(edits, _SMALL * area):
+        if not _collapse_short(edits, shortest) + _join_small(edits, smallest):
             break
     return edits
 
 
-def _collapse_short(edits: PolygonEdits, limit: float) -> int:
-    """Collapses edges at the boundary below a length, the shortest first."""
-    sides = {(min(edge), max(edge)) for number in edits.boundary_faces() for edge in edits.sides(number)}
-    lengths = sorted((edits.length((a, b)), (a, b)) for a, b in sides if edits.on_boundary[a] or edits.on_boundary[b])
+def _collapse_short(edits: PolygonEdits, shortest: Floats) -> int:
+    """Collapses edges at curves below a length, the shortest first."""
+
+    def share(edge: tuple[int, int]) -> float:
+        return edits.length(edge) / float(shortest[list(edge)].min())
+
+    sides = {(min(edge), max(edge)) for number in edits.curve_faces() for edge in edits.sides(number)}
+    shares = sorted((share((a, b)), (a, b)) for a, b in sides if edits.on_curve[a] or edits.on_curve[b])
     done = 0
-    for length, (a, b) in lengths:
-        if length >= limit:
+    for before, (a, b) in shares:
+        if before >= 1:
             break
-        if edits.around.get(a) and edits.around.get(b) and edits.length((a, b)) < limit:
+        if edits.around.get(a) and edits.around.get(b) and share((a, b)) < 1:
             done += edits.collapse((a, b))
     return done
 
 
-def _join_small(edits: PolygonEdits, limit: float) -> int:
-    """Joins faces below an area with the neighbour across their longest side, or collapses their shortest."""
+def _join_small(edits: PolygonEdits, smallest: Floats) -> int:
+    """Joins faces at curves below an area with the neighbour across their longest side, or collapses their shortest."""
     done = 0
-    for number in sorted(edits.boundary_faces(), key=edits.area):
-        if number not in edits.faces or edits.area(number) >= limit:
+    for number in sorted(edits.curve_faces(), key=edits.area):
+        if number not in edits.faces or edits.area(number) >= smallest[edits.faces[number]].min():
             continue
         sides = sorted(edits.sides(number), key=edits.length)
         inner = [edge for edge in sides if edits.across(edge, number) is not None]
@@ -70,11 +76,13 @@ class Compact(NamedTuple):
         positions: (V, 3).
         faces: vertices counterclockwise.
         number: (N,) vertex of every node, that of the one it was collapsed to, -1 if it is gone.
+        creases: (C, 2) vertices of edges along creases, the smaller first.
     """
 
     positions: Floats
     faces: list[list[int]]
     number: Ints
+    creases: Ints
 
 
 def compact(edits: PolygonEdits) -> Compact:
@@ -85,4 +93,6 @@ def compact(edits: PolygonEdits) -> Compact:
     faces = [number[face].tolist() for face in edits.faces.values()]
     for node in edits.went:
         number[node] = number[edits.place_of(node)]
-    return Compact(edits.positions[used], faces, number)
+    pairs = {(min(a, b), max(a, b)) for a, others in edits.beside.items() for b in others}
+    creases = np.sort(number[np.array(sorted(pairs), np.int64).reshape(-1, 2)], axis=1)
+    return Compact(edits.positions[used], faces, number, creases)

@@ -9,13 +9,10 @@ import numpy as np
 from ..fields.frames import Bools, FaceFrames, Floats, Ints
 from ..fields.matchings import QUARTER
 from .cut_graph import CutGraph
-from .seams import Seams
-
-_INWARD = 1e-6  # by which a run lies inside its line, so that no cell is left beyond it
 
 
 class BoundaryRun(NamedTuple):
-    """Boundary edges along which one coordinate is the same whole number.
+    """Boundary edges, or sharp ones, along which one coordinate is the same whole number.
 
     Attributes:
         component: 0 if the first coordinate is constant, 1 if the second.
@@ -27,7 +24,7 @@ class BoundaryRun(NamedTuple):
 
 
 def find_runs(
-    frames: FaceFrames, graph: CutGraph, angle: float, shortest: float, components: tuple[int, ...] = (0, 1)
+    frames: FaceFrames, graph: CutGraph, angle: float, shortest: float | Floats, components: tuple[int, ...] = (0, 1)
 ) -> list[BoundaryRun]:
     """Longest stretches of the boundary that follow the field, cut where the mesh is cut.
 
@@ -35,7 +32,7 @@ def find_runs(
         frames: of the triangles.
         graph: the cut.
         angle: largest angle between an edge and the field, radians.
-        shortest: length of a stretch that counts.
+        shortest: length of a stretch that counts, also (F,) by the triangles that it runs along.
         components: coordinates whose lines run along or across the field.
     """
     topology = frames.topology
@@ -44,14 +41,15 @@ def find_runs(
     corner_from[topology.corners.numpy()[outer]] = outer
     turned = _turned_around(frames, graph)
     runs: list[BoundaryRun] = []
+    least = np.broadcast_to(np.asarray(shortest), len(frames.triangles))
     for loop in topology.boundary_loops():
         corners = corner_from[loop.numpy()]
-        quarter, off, length = _against_field(frames, graph, corners)
+        quarter, off, length = against_field(frames, graph, corners)
         goes_on = (
             (quarter == (np.roll(quarter, 1) - turned[loop.numpy()]) % 4) & (off <= angle) & np.roll(off <= angle, 1)
         )
         for stretch in _stretches(off <= angle, goes_on):
-            if length[stretch].sum() >= shortest:
+            if (length[stretch] / least[corners[stretch] // 3]).sum() >= 1:
                 runs += _cut_where_frames_turn(corners[stretch], quarter[stretch])
     return [run for run in runs if run.component in components]
 
@@ -65,7 +63,7 @@ def _turned_around(frames: FaceFrames, graph: CutGraph) -> Ints:
     return np.asarray(np.rint(turned), np.int64)
 
 
-def _against_field(frames: FaceFrames, graph: CutGraph, corners: Ints) -> tuple[Ints, Floats, Floats]:
+def against_field(frames: FaceFrames, graph: CutGraph, corners: Ints) -> tuple[Ints, Floats, Floats]:
     """Of boundary edges that start at corners: nearest direction of the field (0 to 3), angle to it, length."""
     face, corner = corners // 3, corners % 3
     start = frames.points[frames.triangles[face, corner]]
@@ -96,21 +94,3 @@ def _cut_where_frames_turn(corners: Ints, quarter: Ints) -> list[BoundaryRun]:
         # Along the first axis of the field, quarter 0 or 2, the second coordinate is constant.
         runs.append(BoundaryRun(1 - int(quarter[part[0]]) % 2, ends))
     return runs
-
-
-def inward_moves(seams: Seams, values: np.ndarray, triangles: Ints, runs: list[BoundaryRun]) -> np.ndarray:
-    """(V,) complex: moves of the vertices on runs into the surface, for their values, not those of copies."""
-    moves: np.ndarray = np.zeros(int(triangles.max()) + 1, complex)
-    for run in runs:
-        axis = 1j if run.component else 1.0
-        for (face, start), (_, end) in zip(run.corners[::2], run.corners[1::2], strict=True):
-            copies = seams.copies[face]
-            into = (values[copies[3 - start - end]] - values[copies[start]]) / axis
-            for corner in (start, end):
-                move = _INWARD * np.sign(into.real) * axis * seams.unit[copies[corner]].conjugate()
-                vertex = triangles[face, corner]
-                for unit in (1.0, 1j):
-                    part = (move / unit).real
-                    if part:
-                        moves[vertex] += part * unit - (moves[vertex] / unit).real * unit
-    return moves

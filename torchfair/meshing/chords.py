@@ -22,7 +22,7 @@ class Chords:
     """Pieces of lines inside triangles, each between two places on the border of its triangle.
 
     Places are numbered counterclockwise around every triangle, face after face. Nodes are crossings, then
-    singular vertices.
+    vertices that are nodes.
 
     Attributes:
         face, coordinate, level: (C,).
@@ -52,8 +52,13 @@ class LatticePoints:
     places: Ints
 
 
-def find_chords(found: SeamlessMap, crossings: Crossings) -> Chords:
+def find_chords(found: SeamlessMap, crossings: Crossings, creases: Bools) -> Chords:
     """The chords of all triangles, by joining crossings of the same line on the border of a triangle.
+
+    Args:
+        found: the map.
+        crossings: of its lines with edges.
+        creases: (I,) bool: edges that are curves of their own.
 
     Raises:
         BrokenLinesError: if a line enters a triangle and does not leave it.
@@ -65,27 +70,29 @@ def find_chords(found: SeamlessMap, crossings: Crossings) -> Chords:
     order, new = sorted_groups(face, coordinate, level, place)
     starts = np.flatnonzero(np.r_[new[:1], _changes(face, coordinate, level, order)])
     counts = np.diff(np.r_[starts, len(order)])
-    from_singular = node[order[starts]] >= len(crossings.edge)
-    if (counts > 2).any() or ((counts == 1) & ~from_singular).any():
+    from_vertex = node[order[starts]] >= len(crossings.edge)
+    if (counts > 2).any() or ((counts == 1) & ~from_vertex).any():
         raise BrokenLinesError("lines of the map end inside the surface")
     pairs = starts[counts == 2]
     a, b = order[pairs], order[pairs + 1]
-    once = ~_seen_from_the_other_side(found, face[a], node[a], node[b], len(crossings.edge))
+    once = ~_are_there_already(found, face[a], node[a], node[b], len(crossings.edge), creases)
     a, b = a[once], b[once]
     return Chords(face[a], coordinate[a], level[a], place[a], place[b], node[a], node[b])
 
 
-def _seen_from_the_other_side(found: SeamlessMap, face: Ints, first: Ints, second: Ints, singular: int) -> Bools:
-    """Which chords join two singular vertices, so that they are edges, and lie in the right face of the edge."""
+def _are_there_already(
+    found: SeamlessMap, face: Ints, first: Ints, second: Ints, first_vertex: int, creases: Bools
+) -> Bools:
+    """Which chords join two vertices, so that they are edges, and lie in the right face of the edge or on a crease."""
     frames = found.frames
-    vertices = np.flatnonzero(found.graph.singular)
+    vertices = np.flatnonzero(found.graph.nodes)
     again = np.zeros(len(face), bool)
-    for chord in np.flatnonzero((first >= singular) & (second >= singular)).tolist():
-        ends = set(vertices[[first[chord] - singular, second[chord] - singular]].tolist())
+    for chord in np.flatnonzero((first >= first_vertex) & (second >= first_vertex)).tolist():
+        ends = set(vertices[[first[chord] - first_vertex, second[chord] - first_vertex]].tolist())
         corners = frames.triangles[face[chord]].tolist()
         side = next(k for k in range(3) if {corners[k], corners[(k + 1) % 3]} == ends)
         edge = int(frames.topology.corner_edges[3 * int(face[chord]) + side])
-        again[chord] = frames.faces[edge, 0] != face[chord]
+        again[chord] = frames.faces[edge, 0] != face[chord] or creases[edge]
     return again
 
 
@@ -103,8 +110,8 @@ def _border(found: SeamlessMap, crossings: Crossings) -> tuple[Ints, ...]:
     inner = np.flatnonzero(edge < len(frames.faces))
     right = edge[inner]
     back = crossings.offsets[right + 1] - number[inner]
-    triangle, at = np.nonzero(found.graph.singular[frames.triangles])
-    name = np.cumsum(found.graph.singular) - 1 + count
+    triangle, at = np.nonzero(found.graph.nodes[frames.triangles])
+    name = np.cumsum(found.graph.nodes) - 1 + count
     value = crossings.values[triangle, at]
     node = name[frames.triangles[triangle, at]]
     first, second = np.zeros_like(at), np.ones_like(at)

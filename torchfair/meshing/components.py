@@ -16,10 +16,14 @@ from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
 from ..topology import Topology
+from .attempt import PieceMesh
+from .curvature_sizes import CurvatureSizes
 from .curved_surface import on_curved_surface
 from .ladder import NoMeshError, mesh_component
 from .lattice import Lattice
+from .mesh_creases import MeshCreases
 from .settings import MeshingSettings
+from .sizes import SizeField
 from .surface import DesignSurface, components_of
 from .verification import Shape, shape_of
 
@@ -38,26 +42,25 @@ class ReadSurface:
         fields: directions of each.
         rings: over how many rings curvature of each is averaged.
         notes: what was found, in words.
+        sizing: lengths of edges over the mean one, which is given, where they are not the same everywhere.
     """
 
     parts: list[DesignSurface]
     fields: list[Directions]
     rings: list[int]
     notes: list[str]
+    sizing: Callable[[float], CurvatureSizes] | None = None
 
     @cached_property
     def whole(self) -> tuple[Tensor, Topology]:
         """Triangles of all components in order."""
-        if len(self.parts) == 1:
-            return self.parts[0].vertices, self.parts[0].topology
-        offsets = np.cumsum([0, *(part.topology.num_vertices for part in self.parts)])
-        faces = [part.topology.triangles + int(offset) for part, offset in zip(self.parts, offsets, strict=False)]
-        vertices = torch.cat([part.vertices for part in self.parts])
-        return vertices, Topology.from_faces(torch.cat(faces), len(vertices))
+        return _together([(part.vertices, part.topology) for part in self.parts])
 
     def curved(self, points: Tensor) -> Tensor:
-        """Points on the triangles, moved onto a smooth surface through their vertices."""
-        return on_curved_surface(points, *self.whole, min(self.rings))
+        """Points on the triangles, moved onto a smooth surface through their vertices, smooth but for creases."""
+        smooth = [part.frames.cut_along(part.sharp) if part.sharp.any() else part.frames for part in self.parts]
+        apart = _together([(torch.from_numpy(of.points), of.topology) for of in smooth])
+        return on_curved_surface(points, *apart, min(self.rings))
 
     @cached_property
     def frames(self) -> FaceFrames:
@@ -73,6 +76,11 @@ class ReadSurface:
             np.concatenate([of.confidence for of in self.fields]),
         )
 
+    def sized(self, sizes: SizeField) -> list[DesignSurface]:
+        """The components with spacings that differ."""
+        counts = [part.topology.num_faces for part in self.parts]
+        return [replace(part, sizes=of) for part, of in zip(self.parts, sizes.split(counts), strict=True)]
+
     @cached_property
     def shape(self) -> Shape:
         """Euler number, loops and components."""
@@ -81,7 +89,7 @@ class ReadSurface:
 
 def read_surface(vertices: Tensor, topology: Topology, settings: MeshingSettings) -> ReadSurface:
     """The components of a mesh with their directions. Errors as of :func:`principal_quads`."""
-    parts = components_of(vertices, topology)
+    parts = components_of(vertices, topology, settings.crease_angle)
     found = [part.directions(settings.noise) for part in parts]
     notes = [
         f"{_name(number, len(parts))}the surface is rough: curvature fitted over {rings} rings"
@@ -115,19 +123,23 @@ class Pieces:
         positions: (V, 3).
         faces: vertices counterclockwise.
         rows: edges with the second coordinate constant, the smaller vertex first.
+        creases: edges along creases.
         places: (n, 3) singular points.
         indices: (n,) of the field.
         notes: what was changed, in words.
         plans: (components) number of the plan that gave each.
+        sizes: what lengths were asked for, None if they were the same everywhere.
     """
 
     positions: Floats
     faces: list[list[int]]
     rows: set[tuple[int, int]]
+    creases: MeshCreases
     places: Tensor
     indices: Tensor
     notes: list[str]
     plans: list[int]
+    sizes: CurvatureSizes | None
 
 
 def mesh_components(
@@ -149,9 +161,11 @@ def mesh_components(
     Raises:
         NoMeshError: if one has no valid mesh.
     """
-    positions, faces, rows, places, indices, notes, taken = [], [], set(), [], [], [], []
-    offset = 0
-    for number, (part, directions) in enumerate(zip(surface.parts, surface.fields, strict=True)):
+    made: list[PieceMesh] = []
+    notes, taken = [], []
+    sizes = surface.sizing and surface.sizing(spacing)
+    parts = surface.parts if sizes is None else surface.sized(sizes.field)
+    for number, (part, directions) in enumerate(zip(parts, surface.fields, strict=True)):
         smoothing = settings.smoothing_length(surface.rings[number])
         begin = 0 if first is None else first[number]
         mesh, words, plan = mesh_component(part, directions, lattices[number], spacing, smoothing, settings, begin)
@@ -159,14 +173,23 @@ def mesh_components(
         if words:
             name = _name(number, len(surface.parts))
             notes.append(f"{name}not as asked for, which gave no valid mesh: {words}")
-        positions.append(mesh.positions)
-        faces += [[node + offset for node in face] for face in mesh.faces]
-        rows |= {(a + offset, b + offset) for a, b in mesh.rows}
-        places.append(mesh.singular_places)
-        indices.append(mesh.singular_charges / 4)
-        offset += len(mesh.positions)
-    at = torch.from_numpy(np.concatenate(places))
-    return Pieces(np.concatenate(positions), faces, rows, at, torch.from_numpy(np.concatenate(indices)), notes, taken)
+        made.append(mesh)
+    offsets = np.cumsum([0, *(len(mesh.positions) for mesh in made[:-1])]).tolist()
+    both = list(zip(made, offsets, strict=True))
+    return Pieces(
+        np.concatenate([mesh.positions for mesh in made]),
+        [[node + offset for node in face] for mesh, offset in both for face in mesh.faces],
+        {(a + offset, b + offset) for mesh, offset in both for a, b in mesh.rows},
+        MeshCreases(
+            torch.from_numpy(np.concatenate([mesh.creases + offset for mesh, offset in both])),
+            torch.from_numpy(np.concatenate([mesh.sharp for mesh in made])),
+        ),
+        torch.from_numpy(np.concatenate([mesh.singular_places for mesh in made])),
+        torch.from_numpy(np.concatenate([mesh.singular_charges / 4 for mesh in made])),
+        notes,
+        taken,
+        sizes,
+    )
 
 
 def mesh_to_count(
@@ -205,7 +228,7 @@ def mesh_to_count(
             again = mesh_components(surface, lattices, other, short, best.plans)
         except NoMeshError:
             break
-        if abs(faces_of(again) / count - 1) >= abs(ratio - 1):
+        if len(again.creases.given) < len(best.creases.given) or abs(faces_of(again) / count - 1) >= abs(ratio - 1):
             break
         if len(again.notes) > len(best.notes) and abs(ratio - 1) <= _FAR:
             break
@@ -214,13 +237,27 @@ def mesh_to_count(
 
 
 def on_surface(pieces: Pieces, surface: ReadSurface, settings: MeshingSettings) -> Pieces:
-    """Pieces with vertices and singular points where the settings want them: on the curved surface or on triangles."""
+    """Pieces with vertices and singular points where the settings want them: on the curved surface or on triangles.
+
+    Those on creases stay.
+    """
     if not settings.curved:
         return pieces
-    moved = surface.curved(torch.cat([torch.from_numpy(pieces.positions), pieces.places]))
-    count = len(pieces.positions)
-    return replace(pieces, positions=moved[:count].numpy(), places=moved[count:])
+    flat, on_creases = torch.from_numpy(pieces.positions), pieces.creases.edges.flatten()
+    moved = surface.curved(torch.cat([flat, pieces.places]))
+    positions, places = moved[: len(flat)].index_copy(0, on_creases, flat[on_creases]), moved[len(flat) :]
+    return replace(pieces, positions=positions.numpy(), places=places)
 
 
 def _name(number: int, count: int) -> str:
     return f"component {number + 1}: " if count > 1 else ""
+
+
+def _together(meshes: list[tuple[Tensor, Topology]]) -> tuple[Tensor, Topology]:
+    """Triangles of meshes as one mesh, in order."""
+    if len(meshes) == 1:
+        return meshes[0]
+    offsets = np.cumsum([0, *(topology.num_vertices for _, topology in meshes)])
+    faces = [topology.triangles + int(offset) for (_, topology), offset in zip(meshes, offsets, strict=False)]
+    vertices = torch.cat([points for points, _ in meshes])
+    return vertices, Topology.from_faces(torch.cat(faces), len(vertices))

@@ -11,8 +11,6 @@ from ..fields.frames import Bools, Floats, Ints
 from .seamless_map import SeamlessMap
 from .seams import ROTATIONS
 
-_MARGIN = 1e-7  # by which vertices that are not singular stay off the lines
-
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
@@ -36,9 +34,9 @@ class Crossings:
     values: np.ndarray
 
 
-def find_crossings(found: SeamlessMap, values: np.ndarray) -> Crossings:
-    """The crossings of a seamless map, for values of copies off the lines."""
-    frames, at_corners = found.frames, values[found.seams.copies]
+def find_crossings(found: SeamlessMap, at_corners: np.ndarray) -> Crossings:
+    """The crossings of a seamless map, for values (F, 3) at corners off the lines."""
+    frames = found.frames
     face, corner = frames.left_corners
     start, end = at_corners[face, corner], at_corners[face, (corner + 1) % 3]
     parts = [_levels(getattr(start, part), getattr(end, part)) for part in ("real", "imag")]
@@ -51,28 +49,6 @@ def find_crossings(found: SeamlessMap, values: np.ndarray) -> Crossings:
     return Crossings(
         edge, along, offsets, np.stack([coordinate, other[0]], 1), np.stack([level, other[1]], 1), at_corners
     )
-
-
-def off_the_lines(found: SeamlessMap, inward: np.ndarray | None = None) -> np.ndarray:
-    """Values of copies, those of vertices that are not singular moved off whole numbers by a hair.
-
-    Args:
-        found: the map.
-        inward: (V,) complex, by how much vertices on boundary lines are to move into the surface, in the frame of
-            the value of the vertex.
-    """
-    seams, graph = found.seams, found.graph
-    own = np.zeros(len(graph.singular), complex)
-    is_own = np.ones(len(seams.vertex), bool)
-    is_own[list(seams.terms)] = [not seams.terms[c] and seams.unit[c] == 1 for c in seams.terms]
-    own[seams.vertex[is_own]] = found.values[is_own]
-    move = np.zeros(len(own), complex) if inward is None else inward.copy()
-    for part, factor in ((own.real, 1), (own.imag, 1j)):
-        to_line = part - np.rint(part)
-        close = (np.abs(to_line) < _MARGIN) & ((move.real if factor == 1 else move.imag) == 0)
-        move[close] += factor * (np.where(to_line[close] < 0, -_MARGIN, _MARGIN) - to_line[close])
-    move[graph.singular] = 0
-    return np.asarray(found.values + seams.unit * move[seams.vertex])
 
 
 def _levels(start: Floats, end: Floats) -> tuple[Ints, Ints, Floats]:

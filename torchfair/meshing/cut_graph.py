@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +32,7 @@ class CutGraph:
         charges: (V,) four times the index.
         paths: place of every cut edge; all edges of a path turn alike.
         num_paths: their number.
+        nodes: (V,) bool: vertices that become points of the lattice, singular ones among them.
     """
 
     angles: Floats
@@ -41,11 +41,7 @@ class CutGraph:
     charges: Ints
     paths: dict[int, PathEdge]
     num_paths: int
-
-    @cached_property
-    def singular(self) -> Bools:
-        """(V,) where the index is not 0."""
-        return np.asarray(self.charges != 0)
+    nodes: Bools
 
 
 def cut_open(frames: FaceFrames, angles: Floats, matched: Ints, charges: Ints) -> CutGraph:
@@ -71,7 +67,7 @@ def cut_open(frames: FaceFrames, angles: Floats, matched: Ints, charges: Ints) -
     cut = ~tree
     _prune(frames, cut, singular)
     paths, count = _paths(frames, cut, singular)
-    return CutGraph(angles + QUARTER * turned, quarters % 4, cut, charges, paths, count)
+    return CutGraph(angles + QUARTER * turned, quarters % 4, cut, charges, paths, count, singular)
 
 
 def dual_graph(frames: FaceFrames) -> sp.csr_matrix:

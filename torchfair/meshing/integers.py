@@ -20,7 +20,7 @@ class IntegerSplit:
 
     Attributes:
         free: (2N, n) of the free real values x.
-        whole: (2N, m) of the whole numbers z: two for each singular vertex, then for each path, one for each run.
+        whole: (2N, m) of the whole numbers z: two for each node, then for each path, one for each run.
         basis: (m, k) every allowed z is ``basis @ y`` with whole y.
         fixed: (2N,) what holds the map where nothing else does.
     """
@@ -38,7 +38,7 @@ def split_integers(frames: FaceFrames, graph: CutGraph, seams: Seams, runs: list
         frames: of the triangles.
         graph: the cut.
         seams: its copies.
-        runs: boundary edges on lines of whole numbers.
+        runs: edges on lines of whole numbers.
     """
     return _Splitter(frames, graph, seams, runs).split()
 
@@ -46,9 +46,9 @@ def split_integers(frames: FaceFrames, graph: CutGraph, seams: Seams, runs: list
 class _Splitter:
     def __init__(self, frames: FaceFrames, graph: CutGraph, seams: Seams, runs: list[BoundaryRun]) -> None:
         self.frames, self.graph, self.seams, self.runs = frames, graph, seams, runs
-        self.singular = np.flatnonzero(graph.singular)
-        self.place = {int(vertex): 2 * number for number, vertex in enumerate(self.singular)}
-        self.first_path = 2 * len(self.singular)
+        self.nodes = np.flatnonzero(graph.nodes)
+        self.place = {int(vertex): 2 * number for number, vertex in enumerate(self.nodes)}
+        self.first_path = 2 * len(self.nodes)
         self.first_run = self.first_path + 2 * graph.num_paths
         self.count = self.first_run + len(runs)
 
@@ -60,10 +60,8 @@ class _Splitter:
         basis = integer_kernel(rows + pins, self.count)
         unknowns = values.shape[1]
         free = np.ones(unknowns, bool)
-        free[[2 * v + k for v in self.singular for k in (0, 1)]] = False
         free[list(ties) + held] = False
-        entries = [(2 * v + k, at + k, 1) for v, at in self.place.items() for k in (0, 1)]
-        entries += [(unknown, number, factor) for unknown, row in ties.items() for number, factor in row.items()]
+        entries = [(unknown, number, factor) for unknown, row in ties.items() for number, factor in row.items()]
         tied = _sparse(entries, (unknowns, self.count))
         paths = sp.csr_matrix(
             (steps.data, steps.indices + self.first_path, steps.indptr), (len(self.seams.vertex) * 2, self.count)
@@ -73,8 +71,8 @@ class _Splitter:
         return IntegerSplit(values[:, np.flatnonzero(free)], (values @ tied + paths).tocsr(), basis, values @ fixed)
 
     def _ties(self, values: sp.csr_matrix, steps: sp.csr_matrix) -> tuple[dict[int, Row], list[Row]]:
-        """Values on runs by whole numbers; and what holds where a value is on two runs, or on one twice."""
-        ties: dict[int, Row] = {}
+        """Values at nodes and on runs by whole numbers; and what holds where a value is on several, or on one twice."""
+        ties: dict[int, Row] = {2 * v + k: {at + k: 1} for v, at in self.place.items() for k in (0, 1)}
         rows: list[Row] = []
         for number, run in enumerate(self.runs):
             for corner in run.corners:
@@ -103,7 +101,7 @@ class _Splitter:
 
     def _gauge(self, tied: set[int]) -> tuple[list[int], list[Row]]:
         """Free unknowns that are held, and whole numbers that are zero, so that the map has one place."""
-        if len(self.singular):
+        if len(self.nodes):
             return [], [{0: 1}, {1: 1}]
         if any(self.graph.quarters[edge] for edge in self.graph.paths):
             return [], []  # it turns about a point of its own

@@ -11,6 +11,7 @@ from ..errors import MeshError
 from ..fields import Directions
 from .attempt import FailedAttemptError, PieceMesh, Plan, attempt
 from .combing import combed
+from .creases import Creases, find_creases
 from .cut_graph import CutGraph
 from .lattice import Lattice
 from .settings import MeshingSettings
@@ -64,35 +65,50 @@ def mesh_component(
         return surface.cut_finer(directions, spacing)
 
     @cache
-    def graph(spacing: float, smoothing: float) -> CutGraph:
-        triangles, carried = finer(spacing)
-        return combed(triangles.frames, carried, lattice.symmetry, smoothing, settings.merging * spacing)
+    def creases(spacing: float, kept: bool) -> Creases:
+        triangles = finer(spacing)[0]
+        sharp = triangles.sharp & kept
+        return find_creases(triangles.frames, sharp, settings.corner_angle, spacing)
 
-    for plan, words in itertools.islice(plans(spacing, smoothing, settings), first, None):
-        if number and (not settings.fallback or time.process_time() - began > settings.time_limit):
-            break
+    @cache
+    def graph(spacing: float, smoothing: float, kept: bool) -> CutGraph:
+        triangles, carried = finer(spacing)
+        merging, sharp = settings.merging * spacing, creases(spacing, kept)
+        return combed(triangles.frames, carried, lattice.symmetry, smoothing, merging, sharp, settings.boundary_angle)
+
+    tried = enumerate(plans(spacing, smoothing, settings, bool(surface.sharp.any())))
+    for place, (plan, words) in itertools.islice(tried, first, None):
+        late = plan.creases and time.process_time() - began > settings.time_limit
+        if number and (not settings.fallback or late):
+            continue
         number += 1
         try:
-            made = attempt(finer(plan.spacing)[0], graph(plan.spacing, plan.smoothing), lattice, plan, settings)
-            return made, words, first + number - 1
+            field = graph(plan.spacing, plan.smoothing, plan.creases)
+            sharp = creases(plan.spacing, plan.creases)
+            return attempt(finer(plan.spacing)[0], sharp, field, lattice, plan, settings), words, place
         except FailedAttemptError as error:
             failure = error if failure is None or failure.vertex < 0 else failure
     assert failure is not None
     raise NoMeshError(_refusal(failure, number), failure.vertex)
 
 
-def plans(spacing: float, smoothing: float, settings: MeshingSettings) -> Iterator[tuple[Plan, str]]:
-    """What is tried, and how that differs from what was asked for."""
+def plans(spacing: float, smoothing: float, settings: MeshingSettings, creased: bool) -> Iterator[tuple[Plan, str]]:
+    """What is tried, and how that differs from what was asked for; without the creases at last, where there are any."""
+    can_align = settings.align_boundary or creased
     for scale in _SPACINGS:
         for smoother in _SMOOTHER:
-            for align in (True, False) if settings.align_boundary else (False,):
+            for align in (True, False) if can_align else (False,):
                 plan = Plan(spacing * scale, spacing * smoothing * smoother, align)
                 words = [
                     f"directions smoothed over {smoothing * smoother:g} edges" if smoother != 1 else "",
-                    "boundary not aligned" if settings.align_boundary and not align else "",
+                    f"{'boundary and creases' if creased else 'boundary'} not aligned"
+                    if can_align and not align
+                    else "",
                     f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces" if scale != 1 else "",
                 ]
                 yield plan, ", ".join(filter(None, words))
+    if creased:
+        yield Plan(spacing, spacing * smoothing, settings.align_boundary, creases=False), "creases not kept"
 
 
 def _refusal(failure: FailedAttemptError, number: int) -> str:

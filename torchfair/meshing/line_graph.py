@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._graph import connected
-from ..fields.frames import Bools, FaceFrames, Floats, Ints
+from ..fields.frames import Bools, Floats, Ints
 from .chords import BrokenLinesError, Chords, LatticePoints
+from .crease_darts import crease_darts
+from .crease_runs import CreaseLines
 from .crossings import Crossings
+from .dart_ranks import crease_ranks, line_ranks
 from .seamless_map import SeamlessMap
 
 _ALONG_BOUNDARY = 2  # in place of the constant coordinate
@@ -21,64 +24,80 @@ class LineGraph:
 
     Attributes:
         positions: (N, 3) of nodes.
-        on_boundary, singular: (N,) bool.
-        is_corner: (N,) bool: boundary vertices that stay.
+        on_boundary: (N,) bool.
+        at_vertex: (N,) bool: points of the lattice at vertices, singular ones among them.
+        is_corner: (N,) bool: vertices on the boundary and on creases that stay.
         origin: (D,) node where a dart starts.
         twin: (D,) the same edge from its other end.
         previous: (D,) the next dart clockwise around the same node.
-        coordinate: (D,) which coordinate is constant along the edge, 2 on the boundary.
+        coordinate: (D,) which coordinate is constant along the edge, 2 on the boundary, 3 on creases that are no lines.
         outer: (D,) bool: darts with the surface on their right.
+        creases: (C, 2) nodes of the edges along creases.
     """
 
     positions: Floats
     on_boundary: Bools
-    singular: Bools
+    at_vertex: Bools
     is_corner: Bools
     origin: Ints
     twin: Ints
     previous: Ints
     coordinate: Ints
     outer: Bools
+    creases: Ints
 
 
 def build_line_graph(
-    found: SeamlessMap, crossings: Crossings, chords: Chords, points: LatticePoints, corners: Bools
+    found: SeamlessMap, crossings: Crossings, chords: Chords, points: LatticePoints, corners: Bools, lines: CreaseLines
 ) -> LineGraph:
-    """Joins chords over the edges of triangles, adds the boundary, and sorts darts around nodes.
+    """Joins chords over the edges of triangles, adds the boundary and creases, and sorts darts around nodes.
 
     Args:
         found: the map.
         crossings: of its lines with edges.
         chords: of its lines in triangles.
         points: where chords cross.
-        corners: (V,) boundary vertices that become nodes.
+        corners: (V,) vertices on the boundary and on creases that become nodes.
+        lines: creases.
 
     Raises:
         BrokenLinesError: if lines do not fit together.
     """
-    frames = found.frames
-    segments = _segments(crossings, chords, points, int(found.graph.singular.sum()))
+    frames, at_vertices = found.frames, found.graph.nodes
+    first_vertex = len(crossings.edge)
+    first_corner = first_vertex + int(at_vertices.sum()) + len(points.chords)
+    name = np.full(len(frames.points), -1)
+    name[at_vertices] = first_vertex + np.arange(at_vertices.sum())
+    name[corners] = first_corner + np.arange(corners.sum())
+    segments = _segments(crossings, chords, points, int(at_vertices.sum()))
     is_through = np.zeros(int(segments.ends.max(initial=-1)) + 1, bool)
-    is_through[: len(crossings.edge)] = crossings.edge < len(frames.faces)
-    inner = _join(segments, is_through)
-    first_corner = len(crossings.edge) + int(found.graph.singular.sum()) + len(points.chords)
-    ring = _boundary(found, crossings, corners, first_corner)
-    outline = _outline(ring)
-    darts = [np.concatenate(pair) for pair in zip(inner, outline, strict=True)]
-    origin, twin, around, rank, coordinate = darts
-    twin[len(inner[0]) :] += len(inner[0])
-    around = _fan_ranks(found, crossings, origin, around, len(crossings.edge))
-    order = np.lexsort((rank, around, origin))
-    previous = _cyclic_previous(origin[order], order)
-    outer = np.zeros(len(origin), bool)
-    outer[len(inner[0]) + 1 :: 2] = True
+    passes = np.zeros(frames.topology.num_edges, bool)
+    passes[: len(frames.faces)] = ~lines.creases.edges
+    is_through[:first_vertex] = passes[crossings.edge]
     positions = _positions(found, crossings, chords, points, corners)
-    count = len(positions)
-    on_boundary, singular, is_corner = np.zeros((3, count), bool)
+    vertices = np.full(len(positions), -1)
+    vertices[name[name >= 0]] = np.flatnonzero(name >= 0)
+    ring = _boundary(found, crossings, name)
+    along = crease_darts(frames, lines, crossings, name)
+    origin, face, rank, coordinate = _join(segments, is_through)
+    around = line_ranks(frames, crossings, np.flatnonzero(at_vertices), origin, face)
+    parts = [
+        (origin, around, rank, coordinate),
+        _outline(ring),
+        (along.origin, crease_ranks(frames, crossings, vertices, along), 0 * along.origin, along.coordinate),
+    ]
+    count, forward = len(origin), len(origin) + len(parts[1][0])
+    origin, around, rank, coordinate = (np.concatenate(column) for column in zip(*parts, strict=True))
+    order = np.lexsort((rank, around, origin))
+    outer = np.zeros(len(origin), bool)
+    outer[count + 1 : forward : 2] = True
+    on_boundary, at_vertex, is_corner = np.zeros((3, len(positions)), bool)
     on_boundary[np.concatenate([*ring, []]).astype(np.int64)] = True
-    singular[len(crossings.edge) : len(crossings.edge) + int(found.graph.singular.sum())] = True
+    at_vertex[name[at_vertices]] = True
     is_corner[first_corner:] = True
-    return LineGraph(positions, on_boundary, singular, is_corner, origin, twin, previous, coordinate, outer)
+    previous, twin = _cyclic_previous(origin[order], order), np.arange(len(origin)) ^ 1
+    edges = along.origin.reshape(-1, 2)
+    return LineGraph(positions, on_boundary, at_vertex, is_corner, origin, twin, previous, coordinate, outer, edges)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +144,12 @@ def _segments(crossings: Crossings, chords: Chords, points: LatticePoints, num_s
     )
 
 
-Darts = tuple[Ints, Ints, Ints, Ints, Ints]
+def _join(segments: _Segments, is_through: Bools) -> tuple[Ints, Ints, Ints, Ints]:
+    """Darts of whole edges, twins one after the other: segments joined where they pass through an edge of a triangle.
 
-
-def _join(segments: _Segments, is_through: Bools) -> Darts:
-    """Darts of whole edges: segments joined where they pass through an edge of a triangle."""
+    Returns:
+        Their origins, faces, order within the face, and coordinates.
+    """
     count = len(segments.ends)
     dart_origin = segments.ends.ravel()
     owner = np.repeat(np.arange(count), 2)
@@ -144,15 +164,13 @@ def _join(segments: _Segments, is_through: Bools) -> Darts:
     labels = label[owner[ends]]
     if len(ends) % 2 or (labels[::2] != labels[1::2]).any() or len(np.unique(labels)) != label.max(initial=-1) + 1:
         raise BrokenLinesError("a line of the map closes up without meeting another")
-    twin = np.arange(len(ends)) ^ 1
-    return (dart_origin[ends], twin, segments.faces[owner[ends]], segments.ahead.ravel()[ends],
-            segments.coordinate[owner[ends]])  # fmt: skip
+    which = owner[ends]
+    return dart_origin[ends], segments.faces[which], segments.ahead.ravel()[ends], segments.coordinate[which]
 
 
-def _boundary(found: SeamlessMap, crossings: Crossings, corners: Bools, first_corner: int) -> list[Ints]:
+def _boundary(found: SeamlessMap, crossings: Crossings, name: Ints) -> list[Ints]:
     """Nodes along every boundary loop."""
     topology = found.frames.topology
-    name = np.cumsum(corners) - 1 + first_corner
     starts = topology.boundary_edges.numpy()[:, 0]
     edge_from = np.zeros(topology.num_vertices, np.int64)
     edge_from[starts] = np.arange(topology.num_interior_edges, topology.num_edges)
@@ -160,7 +178,7 @@ def _boundary(found: SeamlessMap, crossings: Crossings, corners: Bools, first_co
     for loop in topology.boundary_loops():
         nodes: list[int] = []
         for vertex in loop.tolist():
-            if corners[vertex]:
+            if name[vertex] >= 0:
                 nodes.append(int(name[vertex]))
             edge = edge_from[vertex]
             nodes.extend(range(crossings.offsets[edge], crossings.offsets[edge + 1]))
@@ -168,49 +186,13 @@ def _boundary(found: SeamlessMap, crossings: Crossings, corners: Bools, first_co
     return loops
 
 
-def _outline(loops: list[Ints]) -> Darts:
-    """Darts along the boundary, forward ones (the surface on the left) and backward ones in turn."""
+def _outline(loops: list[Ints]) -> tuple[Ints, Ints, Ints, Ints]:
+    """Darts along the boundary, forward ones (the surface on the left), the first at their nodes, and backward ones."""
     origin = [np.stack([loop, np.roll(loop, -1)], axis=1).ravel() for loop in loops]
     whole = np.concatenate([*origin, []]).astype(np.int64)
-    count = len(whole)
-    backward = np.arange(count) % 2
-    return (
-        whole,
-        np.arange(count) ^ 1,
-        np.where(backward, np.iinfo(np.int64).max, -1),
-        backward,
-        np.full(count, _ALONG_BOUNDARY),
-    )
-
-
-def _fan_ranks(found: SeamlessMap, crossings: Crossings, origin: Ints, face: Ints, first: int) -> Ints:
-    """Order of faces around singular vertices, counterclockwise; for other nodes one face is as good as another."""
-    singular = np.flatnonzero(found.graph.singular)
-    rank = np.minimum(np.maximum(face, -1), 1)
-    rank[face == np.iinfo(np.int64).max] = 2
-    rank[face >= 0] = np.where(face[face >= 0] == np.iinfo(np.int64).max, 2, 0)
-    at = np.flatnonzero((origin >= first) & (origin < first + len(singular)))
-    if not len(at):
-        return rank
-    order = _faces_around(found.frames, singular)
-    rank[at] = [order[int(origin[dart]) - first][int(face[dart])] for dart in at]
-    return rank
-
-
-def _faces_around(frames: FaceFrames, vertices: Ints) -> list[dict[int, int]]:
-    """For every vertex its faces with their numbers counterclockwise."""
-    ring, offsets = frames.topology.ring_vertices.numpy(), frames.topology.ring_offsets.numpy()
-    wanted = set(vertices.tolist())
-    after: dict[tuple[int, int], int] = {}
-    for face in np.flatnonzero(np.isin(frames.triangles, vertices).any(1)).tolist():
-        corners = frames.triangles[face].tolist()
-        for k in range(3):
-            if corners[k] in wanted:
-                after[corners[k], corners[(k + 1) % 3]] = face
-    return [
-        {after[vertex, int(other)]: number for number, other in enumerate(ring[offsets[vertex] : offsets[vertex + 1]])}
-        for vertex in vertices.tolist()
-    ]
+    backward = np.arange(len(whole)) % 2
+    around = np.where(backward, np.iinfo(np.int64).max, -1)
+    return whole, around, backward, np.full(len(whole), _ALONG_BOUNDARY)
 
 
 def _cyclic_previous(origin: Ints, order: Ints) -> Ints:
@@ -241,4 +223,4 @@ def _positions(
     weights = np.clip(np.stack([1 - second - third, second, third], axis=1), 0, 1)
     weights /= weights.sum(1, keepdims=True)
     inside = (weights[:, :, None] * frames.points[frames.triangles[face]]).sum(1)
-    return np.concatenate([on_edges, frames.points[found.graph.singular], inside, frames.points[corners]])
+    return np.concatenate([on_edges, frames.points[found.graph.nodes], inside, frames.points[corners]])

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..fields.frames import Bools, Floats
+from ..fields.frames import Bools, Floats, Ints
 from .polygon_area import area_vector
 
 Edge = tuple[int, int]
@@ -19,12 +19,24 @@ class PolygonEdits:
     Args:
         positions: (N, 3), changed in place.
         faces: nodes counterclockwise, each at least three.
-        on_boundary: (N,) bool, changed in place.
+        on_boundary: (N,) bool.
         fixed: (N,) bool: nodes that keep their places.
+        creases: (C, 2) nodes of edges that stay edges, such as those along creases; none by default.
+
+    Attributes:
+        on_curve: (N,) bool: nodes on the boundary or on creases.
+        beside: neighbours of nodes along creases.
     """
 
-    def __init__(self, positions: Floats, faces: list[list[int]], on_boundary: Bools, fixed: Bools) -> None:
-        self.positions, self.on_boundary, self.fixed = positions, on_boundary, fixed
+    def __init__(
+        self, positions: Floats, faces: list[list[int]], on_boundary: Bools, fixed: Bools, creases: Ints | None = None
+    ) -> None:
+        self.positions, self.on_curve, self.fixed = positions, on_boundary.copy(), fixed
+        self.beside: dict[int, set[int]] = defaultdict(set)
+        for a, b in [] if creases is None else creases.tolist():
+            self.on_curve[[a, b]] = True
+            self.beside[a].add(b)
+            self.beside[b].add(a)
         self.faces = {number: list(face) for number, face in enumerate(faces)}
         self.went: dict[int, int] = {}
         self.around: dict[int, set[int]] = defaultdict(set)
@@ -45,9 +57,9 @@ class PolygonEdits:
         size = float(np.linalg.norm(first))
         return float(area_vector(self.positions, self.faces[number]) @ first) / size if size else 0.0
 
-    def boundary_faces(self) -> list[int]:
-        """Faces with a node on the boundary."""
-        return [number for number, face in self.faces.items() if self.on_boundary[face].any()]
+    def curve_faces(self) -> list[int]:
+        """Faces with a node on the boundary or on a crease."""
+        return [number for number, face in self.faces.items() if self.on_curve[face].any()]
 
     def sides(self, number: int) -> Iterator[Edge]:
         """The edges of a face."""
@@ -67,7 +79,7 @@ class PolygonEdits:
         return float(np.linalg.norm(self.positions[edge[0]] - self.positions[edge[1]]))
 
     def collapse(self, edge: Edge) -> bool:
-        """Collapses an edge to the end that is to stay: a fixed one, or one on the boundary.
+        """Collapses an edge to the end that is to stay: a fixed one, or one on the boundary or on a crease.
 
         Args:
             edge: two nodes, in either order.
@@ -80,7 +92,10 @@ class PolygonEdits:
             stays, goes = goes, stays
         shared = self.around[stays] & self.around[goes]
         sides = sum(self._has(number, edge) or self._has(number, edge[::-1]) for number in shared)
-        if not sides or self.fixed[goes] or (sides == 2 and self.on_boundary[stays] and self.on_boundary[goes]):
+        is_curve = sides == 1 or stays in self.beside[goes]
+        if not sides or self.fixed[goes] or (not is_curve and self.on_curve[stays] and self.on_curve[goes]):
+            return False
+        if self.beside[stays] & self.beside[goes] or (self.beside[goes] and stays not in self.beside[goes]):
             return False
         changed: dict[int, list[int]] = {}
         for number in self.around[stays] | self.around[goes]:
@@ -89,17 +104,17 @@ class PolygonEdits:
             if len(set(face)) != len(face):
                 return False
             changed[number] = face if len(face) >= 3 else []
-        return self._allowed(changed) and self._apply(changed, goes, bool(self.on_boundary[goes]), stays)
+        return self._allowed(changed) and self._apply(changed, goes, stays)
 
     def _rank(self, node: int) -> tuple[bool, bool, int, float]:
         """Of two nodes the higher one stays; the last is by geometry, so that numbers do not decide."""
         around = self.around[node]
-        return bool(self.fixed[node]), bool(self.on_boundary[node]), len(around), sum(sorted(map(self.area, around)))
+        return bool(self.fixed[node]), bool(self.on_curve[node]), len(around), sum(sorted(map(self.area, around)))
 
     def merge(self, number: int, edge: Edge) -> bool:
         """Makes one face of a face and its neighbour across an edge; see :meth:`collapse`."""
         other = self.across(edge, number)
-        if other is None:
+        if other is None or edge[1] in self.beside[edge[0]]:
             return False
         ours, theirs = self.faces[number], self.faces[other]
         i, j = ours.index(edge[1]), theirs.index(edge[0])
@@ -110,7 +125,7 @@ class PolygonEdits:
         if not self._allowed(changed):
             return False
         self.normals[number] = self.normals[number] + self.normals[other]
-        return self._apply(changed, None, False, None)
+        return self._apply(changed)
 
     def drop_straight_nodes(self, number: int) -> None:
         """Takes nodes out of a face that it has alone, apart from fixed ones."""
@@ -158,7 +173,7 @@ class PolygonEdits:
                 return step == len(after) and (at == first or bool(starts))
         return False
 
-    def _apply(self, changed: dict[int, list[int]], gone: int | None, reaches: bool, stays: int | None) -> bool:
+    def _apply(self, changed: dict[int, list[int]], gone: int | None = None, stays: int | None = None) -> bool:
         for number, face in changed.items():
             for node in self.faces[number]:
                 self.around[node].discard(number)
@@ -171,6 +186,9 @@ class PolygonEdits:
         if gone is not None and stays is not None:
             del self.around[gone]
             self.went[gone] = stays
-        if stays is not None and reaches:
-            self.on_boundary[stays] = True
+            self.on_curve[stays] |= self.on_curve[gone]
+            for node in self.beside.pop(gone, set()) - {stays}:
+                self.beside[node] ^= {gone, stays}
+                self.beside[stays].add(node)
+            self.beside[stays].discard(gone)
         return True

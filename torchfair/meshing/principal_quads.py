@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import torch
 from torch import Tensor
 
 from ..topology import Topology
 from .components import mesh_to_count, on_surface, read_surface, spacing_of
+from .curvature_sizes import CurvatureSizes, curvature_sizes
 from .lattice import SQUARES
 from .quad_mesh import QuadMesh
 from .report import measure
@@ -32,6 +35,10 @@ def principal_quads(
     Quads along principal directions are nearly planar, and have the least E of all: that of edges across an absolute
     curvature is its integral, so that E is the total absolute curvature C (section 4 of the paper).
 
+    With ``settings.adaptive`` edges across a curvature k have lengths in proportion to ``1 / sqrt|k|``, so that all are
+    about as far off the surface; the longest at most ``settings.spacing_range`` times as long as the shortest. Where
+    lines diverge or converge too much for that, they go on along the directions.
+
     Args:
         vertices: (V, 3) positions of the surface, any length unit.
         topology: its connectivity; polygons are cut into triangles.
@@ -45,6 +52,8 @@ def principal_quads(
         (:func:`torchfair.geometry.planarity`), ``normal_variation`` (E), ``total_absolute_curvature`` (C, of the
         surface) and their ratio ``variation_over_curvature`` (None for flat surfaces), ``distance_max`` of the middles
         of edges and faces from the surface in mean edges, ``singular`` points by index, ``total_index``, and sizes.
+        Adaptive meshes have ``spacing_shortest`` and ``spacing_longest``, as asked for, and ``range_share``, the share
+        of the area where curvature asks for a length out of the range.
 
     Raises:
         ShapeError: if ``vertices`` is not one mesh that fits.
@@ -63,17 +72,23 @@ def principal_quads(
     surface = read_surface(vertices, topology, chosen)
     size = spacing_of(surface, SQUARES.cell, count, spacing)
     lattices = [SQUARES] * len(surface.parts)
-    pieces, size = mesh_to_count(surface, lattices, size, chosen, count, lambda made: len(made.faces))
+
+    def sizing(at: float) -> CurvatureSizes:
+        return curvature_sizes(surface.frames, surface.directions, at, chosen.spacing_range)
+
+    laid = replace(surface, sizing=sizing) if chosen.adaptive else surface
+    pieces, size = mesh_to_count(laid, lattices, size, chosen, count, lambda made: len(made.faces))
     pieces = on_surface(pieces, surface, chosen)
     faces, positions = pieces.faces, torch.from_numpy(pieces.positions)
     made = verified_topology(faces, len(positions), surface.shape)
-    report = measure(positions, made, surface, size, pieces.indices)
+    report = measure(positions, made, surface, size, pieces.indices, pieces.creases)
     return QuadMesh(
         positions.to(vertices),
         made.to(vertices.device),
         pieces.places.to(vertices),
         pieces.indices.to(vertices),
         surface,
-        report,
+        pieces.creases.to(vertices),
+        {**report, **(pieces.sizes.report(size) if pieces.sizes else {})},
         [*surface.notes, *pieces.notes],
     )

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from .._graph import edge_numbers
-from ..fields import Directions
-from ..fields.frames import FaceFrames, Floats
 from ..principal import PrincipalEdges
 from ..topology import Topology
 from .components import Pieces, mesh_to_count, on_surface, read_surface, spacing_of
+from .curvature_sizes import CurvatureSizes, curvature_sizes
 from .cut_cells import cut_cells
 from .lattice import triangle_lattice
 from .report import measure
+from .row_distances import row_distance, row_sizes, rows_across
 from .settings import MeshingSettings
 from .triangle_mesh import TriangleMesh
 from .verification import verified_topology
-
-_EQUILATERAL = math.sqrt(3) / 2
-_MOST = 1.4  # distance of rows over the spacing
-_EXCESS = 0.15  # of E over C, where K is negative
 
 
 def principal_triangles(
@@ -43,7 +37,8 @@ def principal_triangles(
 
     Rows follow the principal curvature a that is smaller where K is negative. There triangles with edges 2p along rows
     that are q apart have E per area ``|a| + |b| + 2 |a| p^2 / q^2``, so rows are laid farther apart than those of
-    equilateral triangles where that brings E nearer to C.
+    equilateral triangles where that brings E nearer to C: all by one ratio, or with ``settings.adaptive`` each by the
+    curvatures in its place, with edges in proportion to ``1 / sqrt|k|`` for the larger one k.
 
     Args:
         vertices: (V, 3) positions of the surface, any length unit.
@@ -54,7 +49,7 @@ def principal_triangles(
 
     Returns:
         The mesh with its principal edges. Its report is that of :func:`principal_quads`, with angles between principal
-        edges and principal directions, and ``row_distance``, over the spacing.
+        edges and principal directions, and ``row_distance``, over the spacing (that of the whole surface).
 
     Raises:
         ShapeError, SettingsError, MeshError: as :func:`principal_quads`.
@@ -68,18 +63,29 @@ def principal_triangles(
     """
     chosen = settings or MeshingSettings()
     surface = read_surface(vertices, topology, chosen)
-    ratio = _row_distance(surface.frames, surface.directions)
+    ratio = row_distance(surface.frames, surface.directions)
     lattices = [triangle_lattice(ratio)] * len(surface.parts)
     size = spacing_of(surface, ratio / 2, count, spacing)
-    across = _rows_across(surface.frames, surface.directions)
-    turned = replace(surface, fields=[of.turned for of in surface.fields]) if across else surface
-    pieces, size = mesh_to_count(turned, lattices, size, chosen, count, _triangles)
+    across = rows_across(surface.frames, surface.directions)
+
+    def sizing(at: float) -> CurvatureSizes:
+        sizes = curvature_sizes(surface.frames, surface.directions, at, chosen.spacing_range, isotropic=True)
+        field = row_sizes(sizes.field, surface.frames, surface.directions, across, ratio, at)
+        return CurvatureSizes(field, sizes.limited)
+
+    laid = replace(
+        surface,
+        fields=[of.turned for of in surface.fields] if across else surface.fields,
+        sizing=sizing if chosen.adaptive else None,
+    )
+    pieces, size = mesh_to_count(laid, lattices, size, chosen, count, _triangles)
     triangles = cut_cells(pieces.positions, pieces.faces, pieces.rows)
     pieces = on_surface(pieces, surface, chosen)
     positions = torch.from_numpy(pieces.positions)
     made = verified_topology(triangles, len(positions), surface.shape)
     principal = PrincipalEdges(made, _mask(made, pieces.rows))
-    report = measure(positions, made, surface, size, pieces.indices, principal.mask[: made.num_interior_edges])
+    followed = principal.mask[: made.num_interior_edges]
+    report = measure(positions, made, surface, size, pieces.indices, pieces.creases, followed)
     if vertices.device.type != "cpu":
         made = made.to(vertices.device)
         principal = PrincipalEdges(made, principal.mask.to(vertices.device))
@@ -88,38 +94,14 @@ def principal_triangles(
         principal,
         pieces.places.to(vertices),
         pieces.indices.to(vertices),
-        {**report, "row_distance": ratio},
+        pieces.creases.to(vertices),
+        {**report, "row_distance": ratio, **(pieces.sizes.report(size) if pieces.sizes else {})},
         [*surface.notes, *pieces.notes],
     )
 
 
 def _triangles(pieces: Pieces) -> int:
     return sum(len(face) - 2 for face in pieces.faces)
-
-
-def _curvatures(frames: FaceFrames, directions: Directions) -> tuple[Floats, Floats]:
-    """Integrals of the sizes of the larger and of the smaller curvature (with signs) over negative K, or over all."""
-    difference = np.abs(directions.values)
-    larger, smaller = directions.means + difference, directions.means - difference
-    saddle = larger * smaller < 0
-    where = frames.areas * (saddle if saddle.any() else True)
-    return np.asarray(where @ np.abs(larger)), np.asarray(where @ np.abs(smaller))
-
-
-def _rows_across(frames: FaceFrames, directions: Directions) -> bool:
-    """Whether rows follow the direction of the smaller curvature (with signs), not of the larger."""
-    larger, smaller = _curvatures(frames, directions)
-    return bool(smaller < larger)
-
-
-def _row_distance(frames: FaceFrames, directions: Directions) -> float:
-    """Distance of rows over the spacing: E exceeds C by ``|a| / (2 ratio^2)`` where K is negative."""
-    larger, smaller = _curvatures(frames, directions)
-    total = float(larger + smaller)
-    if total <= 0:
-        return _EQUILATERAL
-    share = float(min(larger, smaller)) / total
-    return min(max(math.sqrt(share / (2 * _EXCESS)), _EQUILATERAL), _MOST)
 
 
 def _mask(topology: Topology, rows: set[tuple[int, int]]) -> Tensor:

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from ..topology import Topology
 from .components import ReadSurface
+from .mesh_creases import MeshCreases
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +22,7 @@ class QuadMesh:
         singular_points: (n, 3) where the field is singular.
         singular_indices: (n,) its index there: 1/4 where three quads meet, -1/4 where five do.
         surface: what it was made from, with the principal directions that were found.
+        creases: the edges along creases of the surface.
         report: what was measured, by name; see :func:`principal_quads`.
         notes: what was done beyond what was asked for, in words.
     """
@@ -30,5 +32,6 @@ class QuadMesh:
     singular_points: Tensor
     singular_indices: Tensor
     surface: ReadSurface = field(repr=False)
+    creases: MeshCreases
     report: dict[str, Any]
     notes: list[str] = field(default_factory=list)

@@ -14,7 +14,9 @@ from ..energies import NormalVariation, TotalAbsoluteCurvature
 from ..geometry import ReferenceSurface, edge_lengths, face_centres, planarity
 from ..topology import Topology
 from .components import ReadSurface
+from .curvature_sizes import ASKED
 from .measures import angles_to_directions
+from .mesh_creases import MeshCreases
 from .quad_mesh import QuadMesh
 from .verification import shape_of
 
@@ -25,6 +27,7 @@ def measure(
     surface: ReadSurface,
     spacing: float,
     indices: Tensor,
+    creases: MeshCreases,
     chosen: Tensor | None = None,
 ) -> dict[str, Any]:
     """The report of :func:`principal_quads`: see there.
@@ -35,6 +38,7 @@ def measure(
         surface: that it was made from.
         spacing: that was asked for.
         indices: of the singular points.
+        creases: of the mesh.
         chosen: (I,) bool: the inner edges that are to follow directions, all by default.
     """
     reference = ReferenceSurface(*surface.whole)
@@ -59,6 +63,8 @@ def measure(
         "total_absolute_curvature": curvature,
         "variation_over_curvature": variation / curvature if curvature > 1e-9 * mean_edge else None,
         "distance_max": float(reference.closest(middles).distances.max()) / mean_edge,
+        "crease_edges": len(creases.edges),
+        "crease_distance_max": creases.distance(vertices) / mean_edge,
         "mean_edge": mean_edge,
         "spacing": spacing,
         "singular": _counts(indices),
@@ -85,4 +91,6 @@ def measure_mesh_on(vertices: Tensor, mesh: QuadMesh) -> dict[str, Any]:
         ShapeError: if the vertices do not fit the mesh.
     """
     points, topology = one_mesh(vertices, mesh.topology).cpu().double(), mesh.topology.to("cpu")
-    return measure(points, topology, mesh.surface, mesh.report["spacing"], mesh.singular_indices.cpu().double())
+    indices, creases = mesh.singular_indices.cpu().double(), mesh.creases.to(points)
+    asked = {name: mesh.report[name] for name in ASKED if name in mesh.report}
+    return {**measure(points, topology, mesh.surface, mesh.report["spacing"], indices, creases), **asked}

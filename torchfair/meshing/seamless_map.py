@@ -154,7 +154,7 @@ class MapProblem:
     def map_of(self, parts: Floats) -> SeamlessMap:
         """The map whose copies have real and imaginary parts (2N,) in turn."""
         values = parts[::2] + 1j * parts[1::2]
-        at_singular = self.graph.singular[self.seams.vertex]
+        at_singular = self.graph.nodes[self.seams.vertex]
         values[at_singular] = np.rint(values[at_singular].real) + 1j * np.rint(values[at_singular].imag)
         return SeamlessMap(self.frames, self.graph, self.seams, values, self.relative_areas(values))
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .._graph import connected
 from ..fields.frames import FaceFrames, Ints
 from .cut_graph import CutGraph
 
@@ -62,7 +61,7 @@ def find_seams(frames: FaceFrames, graph: CutGraph) -> Seams:
         frames: of the triangles.
         graph: the cut.
     """
-    copies = _copies(frames, graph)
+    copies = frames.joined_corners(graph.cut)
     count = int(copies.max()) + 1
     vertex = np.zeros(count, np.int64)
     vertex[copies.ravel()] = frames.triangles.ravel()
@@ -117,16 +116,6 @@ def _sum(*parts: tuple[complex, Terms]) -> Terms:
         for path, number in terms.items():
             total[path] += factor * number
     return {path: number for path, number in total.items() if number}
-
-
-def _copies(frames: FaceFrames, graph: CutGraph) -> Ints:
-    """(F, 3) corners joined over edges that are not cut."""
-    whole = ~graph.cut
-    (f, g), (i, j) = frames.faces[whole].T, frames.corners[whole].T
-    ours = np.concatenate([3 * f + i, 3 * f + (i + 1) % 3])
-    theirs = np.concatenate([3 * g + (j + 1) % 3, 3 * g + j])
-    count = 3 * len(frames.triangles)
-    return connected(np.stack([ours, theirs], 1), count).reshape(-1, 3)
 
 
 def _links(frames: FaceFrames, graph: CutGraph, copies: Ints) -> dict[int, list[Link]]:

@@ -25,7 +25,7 @@ def gaps(frames: FaceFrames, graph: CutGraph, seams: Seams, radius: float) -> sp
         seams: its copies.
         radius: pairs that are farther from each other on the surface are left out.
     """
-    singular = np.flatnonzero(graph.singular)
+    singular = np.flatnonzero(graph.charges)
     at = [np.flatnonzero((frames.triangles == vertex).any(1)) for vertex in singular]
     if len(singular) < 2:
         return sp.csr_matrix(np.zeros((0, len(seams.vertex)), complex))

@@ -23,8 +23,12 @@ class MeshingSettings:
         noise: Over how many rings of vertices curvature is fitted, from 2 on; ``"auto"`` finds it by the noise.
         merging: Singular vertices that are closer than this are merged, in edge lengths of the new mesh.
         align_boundary: Whether parts of the boundary that nearly follow a direction become lines of the mesh.
-        boundary_angle: How far they may turn from the direction, radians.
-        corner_angle: Boundary vertices that turn by more are corners and stay, radians.
+        boundary_angle: How far they, or creases, may turn from the direction, radians.
+        corner_angle: Vertices where the boundary or a crease turns by more are corners and stay, radians.
+        crease_angle: Edges that bend by more are creases, which are kept, radians; 0 for none.
+        adaptive: Whether edges are shorter where the surface bends more, in proportion to ``1 / sqrt|k|`` across a
+            curvature k, rather than of one length.
+        spacing_range: The longest of these lengths over the shortest, at most.
         curved: Whether vertices lie on a smooth surface through those given, which bends as its curvature is found,
             not on its flat triangles.
         fallback: Whether other settings are tried where these give no valid mesh; what was taken is said.
@@ -40,6 +44,9 @@ class MeshingSettings:
     align_boundary: bool = True
     boundary_angle: float = setting(math.radians(12.0), unit="radians")
     corner_angle: float = setting(math.radians(40.0), unit="radians")
+    crease_angle: float = setting(math.radians(40.0), unit="radians")
+    adaptive: bool = False
+    spacing_range: float = 4.0
     curved: bool = True
     fallback: bool = True
     time_limit: float = setting(40.0, unit="seconds")
@@ -50,11 +57,13 @@ class MeshingSettings:
         if self.noise != "auto":
             check_count("noise (or 'auto')", self.noise, least=2)
         check_number("merging", self.merging, finite=True)
-        for name in ("align_boundary", "curved", "fallback"):
+        check_number("spacing_range", self.spacing_range, least=1, finite=True)
+        for name in ("align_boundary", "adaptive", "curved", "fallback"):
             if not isinstance(getattr(self, name), bool):
                 raise SettingsError(f"{name} must be True or False, got {getattr(self, name)!r}")
         check_number("boundary_angle", self.boundary_angle, most=math.pi / 4)
         check_number("corner_angle", self.corner_angle, above=True, most=math.pi)
+        check_number("crease_angle", self.crease_angle, most=math.pi)
         check_number("time_limit", self.time_limit)
 
     def smoothing_length(self, rings: int) -> float:

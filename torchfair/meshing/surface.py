@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -10,14 +10,18 @@ import torch
 from torch import Tensor
 
 from .._graph import face_components
-from .._half_edges import first_few
+from .._names import PlacedError, few, first_few
 from .._one_mesh import one_mesh
 from ..errors import MeshError
 from ..fields import Directions, FaceFrames, carried_directions, directions_of
+from ..fields.frames import Bools
 from ..geometry import degenerate_faces, rings_for_noise
 from ..subdivision import midpoint
 from ..topology import Topology
 from ..triangulation import triangulate
+from .bridges import cut_bridges
+from .creases import sharp_edges
+from .sizes import SizeField
 
 _COARSE = 1.0  # mean edge over the spacing above which triangles are cut
 _MOST_FACES = 40_000  # that are made by cutting
@@ -30,12 +34,16 @@ class DesignSurface:
     Attributes:
         vertices: (V, 3) float64, on the CPU.
         topology: triangles.
-        numbers: (V,) of the vertices in the mesh that was given.
+        numbers: (V,) of the vertices in the mesh that was given, -1 for new ones.
+        sharp: (I,) bool: interior edges that are creases.
+        sizes: spacings of the new mesh over the mean one, None for the same everywhere.
     """
 
     vertices: Tensor
     topology: Topology
     numbers: Tensor
+    sharp: Bools
+    sizes: SizeField | None = None
 
     @cached_property
     def frames(self) -> FaceFrames:
@@ -43,9 +51,13 @@ class DesignSurface:
         return FaceFrames.of(self.vertices, self.topology)
 
     def directions(self, rings: int | Literal["auto"]) -> tuple[Directions, int]:
-        """Principal directions by so many rings, and their number; ``"auto"`` chooses it by the noise."""
-        number = rings_for_noise(self.vertices, self.topology) if rings == "auto" else rings
-        return directions_of(self.frames, number), number
+        """Principal directions by so many rings, and their number; ``"auto"`` chooses it by the noise.
+
+        Nothing reaches across creases.
+        """
+        smooth = self.frames.cut_along(self.sharp) if self.sharp.any() else self.frames
+        number = rings_for_noise(torch.from_numpy(smooth.points), smooth.topology) if rings == "auto" else rings
+        return directions_of(smooth, number), number
 
     def cut_finer(self, directions: Directions, spacing: float) -> tuple[DesignSurface, Directions]:
         """Triangles fine enough for edges of a length, on the same flat pieces."""
@@ -53,15 +65,20 @@ class DesignSurface:
         while surface.frames.lengths.mean() > _COARSE * spacing and 4 * surface.topology.num_faces <= _MOST_FACES:
             finer = midpoint(surface.topology)
             new = torch.full((finer.topology.num_vertices - surface.topology.num_vertices,), -1)
-            cut = DesignSurface(finer.apply(surface.vertices), finer.topology, torch.cat([surface.numbers, new]))
+            marks = torch.zeros(surface.topology.num_edges, dtype=torch.bool)
+            marks[: len(surface.sharp)] = torch.from_numpy(surface.sharp)
+            sharp = finer.carry_edge_labels(marks)[: finer.topology.num_interior_edges].numpy()
+            points, numbers = finer.apply(surface.vertices), torch.cat([surface.numbers, new])
+            cut = DesignSurface(points, finer.topology, numbers, sharp)
             parents = finer.face_parents.numpy()
             directions = carried_directions(directions, surface.frames, cut.frames, parents)
-            surface = cut
+            sizes = surface.sizes and surface.sizes.carried(surface.frames, cut.frames, parents)
+            surface = replace(cut, sizes=sizes)
         return surface, directions
 
 
-def components_of(vertices: Tensor, topology: Topology) -> list[DesignSurface]:
-    """The components of a mesh, triangulated.
+def components_of(vertices: Tensor, topology: Topology, crease_angle: float = 0.0) -> list[DesignSurface]:
+    """The components of a mesh, triangulated, with edges that bend by more than an angle as creases (0 for none).
 
     Raises:
         ShapeError: if it is not one mesh.
@@ -75,7 +92,8 @@ def components_of(vertices: Tensor, topology: Topology) -> list[DesignSurface]:
         raise MeshError(f"vertices: not finite numbers: {first_few(wrong, len(wrong))}")
     flat = torch.nonzero(degenerate_faces(points, topology)).squeeze(1).tolist()
     if flat:
-        raise MeshError(f"{len(flat)} face(s) have no area: faces {first_few(flat, len(flat))}. Remove or remesh them.")
+        words = ". torchfair.repair_mesh (--repair) drops them; or remesh them."
+        raise PlacedError(f"{len(flat)} face(s) have no area: faces ", few("face", flat), words)
     triangles = triangulate(points, topology).triangles
     whole = Topology.from_faces(triangles, topology.num_vertices)
     labels = face_components(whole)
@@ -83,5 +101,8 @@ def components_of(vertices: Tensor, topology: Topology) -> list[DesignSurface]:
     for label in range(int(labels.max()) + 1):
         chosen = triangles[labels == label]
         numbers, corners = torch.unique(chosen, return_inverse=True)
-        parts.append(DesignSurface(points[numbers], Topology.from_faces(corners, len(numbers)), numbers))
+        part, connectivity = points[numbers], Topology.from_faces(corners, len(numbers))
+        part, connectivity, sharp = cut_bridges(part, connectivity, sharp_edges(part, connectivity, crease_angle))
+        new = torch.full((len(part) - len(numbers),), -1)
+        parts.append(DesignSurface(part, connectivity, torch.cat([numbers, new]), sharp))
     return parts

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..fields.frames import Bools, Floats
+from ..fields.frames import Bools, Floats, Ints
 from .chords import BrokenLinesError, find_chords, find_lattice_points
+from .crease_runs import CreaseLines
 from .crossings import find_crossings
 from .line_graph import LineGraph, build_line_graph
 from .seamless_map import SeamlessMap
@@ -20,20 +21,23 @@ class Cells:
     Attributes:
         positions: (N, 3); nodes that no polygon uses are among them.
         faces: nodes of every polygon, counterclockwise.
-        coordinates: for every side of a polygon the coordinate that is constant on it, 2 on the boundary.
-        on_boundary, singular, is_corner: (N,) bool.
+        coordinates: for every side of a polygon the coordinate that is constant on it, 2 on the boundary, 3 on creases
+            that are no lines.
+        on_boundary: (N,) bool.
+        fixed: (N,) bool: nodes that stay.
+        creases: (C, 2) nodes of the edges along creases.
     """
 
     positions: Floats
     faces: list[list[int]]
     coordinates: list[list[int]]
     on_boundary: Bools
-    singular: Bools
-    is_corner: Bools
+    fixed: Bools
+    creases: Ints
 
 
-def trace_cells(found: SeamlessMap, values: np.ndarray, corners: Bools) -> Cells:
-    """The cells of a seamless map, as faces of the graph that its lines and the boundary make on the surface.
+def trace_cells(found: SeamlessMap, values: np.ndarray, corners: Bools, lines: CreaseLines) -> Cells:
+    """The cells of a seamless map, as faces of the graph that its lines, creases and the boundary make on the surface.
 
     Which lines meet in a triangle follows from the order of their ends on its border alone, and that order is decided
     once for every edge. So the graph is one on the surface whatever rounding does; its cells are those of a mesh of the
@@ -41,18 +45,20 @@ def trace_cells(found: SeamlessMap, values: np.ndarray, corners: Bools) -> Cells
 
     Args:
         found: the map.
-        values: of copies, off the lines.
-        corners: (V,) boundary vertices that stay.
+        values: (F, 3) at corners, off the lines.
+        corners: (V,) vertices on the boundary and on creases that stay, without points of the lattice.
+        lines: creases.
 
     Raises:
         BrokenLinesError: if lines do not fit together.
     """
     crossings = find_crossings(found, values)
-    chords = find_chords(found, crossings)
+    chords = find_chords(found, crossings, lines.creases.edges)
     points = find_lattice_points(chords, len(found.frames.triangles))
-    graph = build_line_graph(found, crossings, chords, points, corners)
+    graph = build_line_graph(found, crossings, chords, points, corners, lines)
     faces, coordinates = _faces(graph)
-    return Cells(graph.positions, faces, coordinates, graph.on_boundary, graph.singular, graph.is_corner)
+    fixed = graph.is_corner | graph.at_vertex
+    return Cells(graph.positions, faces, coordinates, graph.on_boundary, fixed, graph.creases)
 
 
 def _faces(graph: LineGraph) -> tuple[list[list[int]], list[list[int]]]:

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from ..principal import PrincipalEdges
 from ..topology import Topology
+from .mesh_creases import MeshCreases
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +21,7 @@ class TriangleMesh:
         principal: the principal edges, with the topology.
         singular_points: (n, 3) where the directions are singular.
         singular_indices: (n,) their index there: 1/2 where three triangles meet, -1/2 where nine do.
+        creases: the edges along creases of the surface.
         report: what was measured, by name; see :func:`principal_triangles`.
         notes: what was done beyond what was asked for, in words.
     """
@@ -28,6 +30,7 @@ class TriangleMesh:
     principal: PrincipalEdges
     singular_points: Tensor
     singular_indices: Tensor
+    creases: MeshCreases
     report: dict[str, Any]
     notes: list[str] = field(default_factory=list)
 

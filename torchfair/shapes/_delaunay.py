@@ -154,7 +154,8 @@ def _flaps(faces: Ints) -> tuple[Ints, Ints]:
 def _cotangents(vertices: Points, flaps: Ints) -> Points:
     """Sum of the cotangents of the two angles opposite each edge: negative if they exceed 180 degrees."""
     v, w, a, b = (vertices[column] for column in flaps.T)
-    total: Points = sum(
-        (p * q).sum(1) / np.linalg.norm(np.cross(p, q), axis=1) for p, q in ((v - a, w - a), (v - b, w - b))
-    )
+    with np.errstate(divide="ignore", invalid="ignore"):  # minus infinity at angles of 180 degrees, nan without sides
+        total: Points = sum(
+            (p * q).sum(1) / np.linalg.norm(np.cross(p, q), axis=1) for p, q in ((v - a, w - a), (v - b, w - b))
+        )
     return total

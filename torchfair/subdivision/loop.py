@@ -6,8 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from .._connectivity import first_few
-from ..errors import MeshError
+from .._names import PlacedError, few
 from ..topology import Topology
 from ._arrays import MeshArrays
 from ._boundary import Boundary
@@ -58,9 +57,10 @@ def loop(
     """
     if not topology.is_triangular:
         others = torch.nonzero(topology.face_sizes != 3).squeeze(1).tolist()
-        raise MeshError(
-            f"Loop subdivision needs triangles, but {len(others)} face(s) have more corners: faces "
-            f"{first_few(others, len(others))}. Use hybrid or catmull_clark, or cut these faces into triangles first."
+        raise PlacedError(
+            f"Loop subdivision needs triangles, but {len(others)} face(s) have more corners: faces ",
+            few("face", others),
+            ". Use hybrid or catmull_clark, or cut these faces into triangles first.",
         )
     mesh = MeshArrays(topology)
     centred = np.zeros(mesh.num_faces, np.bool_)

@@ -23,7 +23,9 @@ class FairGuard:
         placed: The vertices (V, 3) of the mesh of a state.
         smallest_angle: No corner angle may be smaller, radians.
         smallest_area: No face may be smaller than this fraction of its area at the start.
+        largest_areas: (F,) no face may be larger; None for no bound.
         from_last: Faces may not turn over against the last state, rather than against the start.
+        may_turn: With ``from_last``, whether a face may turn over against the start, step by step.
     """
 
     def __init__(
@@ -34,18 +36,26 @@ class FairGuard:
         *,
         smallest_angle: float,
         smallest_area: float,
+        largest_areas: Tensor | None = None,
         from_last: bool,
+        may_turn: bool = True,
     ) -> None:
         self.topology, self.placed = topology, placed
         self._smallest_angle, self._from_last = smallest_angle, from_last
+        self._largest_areas, self._may_turn = largest_areas, may_turn
         self._start = _Mesh(vertices, topology)
         self._smallest_areas = smallest_area * norm(self._start.area_vectors)
         self._known: list[tuple[Tensor, _Mesh]] = []
 
     def keeps_faces(self, state: State, trial: State) -> bool:
         """Whether no face turns over."""
-        before = self._mesh(state).area_vectors if self._from_last else self._start.area_vectors
-        return bool((dot(before, self._mesh(trial).area_vectors) > 0.0).all())
+        start, before, after = (mesh.area_vectors for mesh in (self._start, self._mesh(state), self._mesh(trial)))
+        if not self._from_last:
+            return bool((dot(start, after) > 0.0).all())
+        kept = dot(before, after) > 0.0
+        if not self._may_turn:
+            kept = kept & ((dot(start, after) > 0.0) | (dot(start, before) <= 0.0))
+        return bool(kept.all())
 
     def keeps_bounds(self, trial: State) -> bool:
         """Whether no corner angle and no face area falls below its bound where gliding vertices are put in place."""
@@ -53,6 +63,8 @@ class FairGuard:
         if after.vertices is trial["vertices"]:
             return True  # barriers see the same mesh
         if not bool((norm(after.area_vectors) >= self._smallest_areas).all()):
+            return False
+        if self._largest_areas is not None and not bool((norm(after.area_vectors) <= self._largest_areas).all()):
             return False
         return bool((corner_angles(after.vertices, self.topology) >= self._smallest_angle).all())
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
+import torch
 from torch import Tensor
 
 from ...energies import angle_variation, normal_variation, total_absolute_curvature, total_mean_curvature
@@ -14,11 +15,13 @@ from ...geometry.closest_point import ReferenceSurface
 from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
 from ..job.promises import Promise, handle_promise
+from .panel_sizes import own_sizes
+from .problem import PLANAR_PROMISE, FairProblem
 
-if TYPE_CHECKING:
-    from .problem import FairProblem
-
-PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
+_EDGES = "mean edges"
+_KEPT_AREA = 0.9  # of that of a sheet with a free boundary
+_FREER = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"
+_OF_PANELS = "planarity of kept faces"
 FLAT_PROMISE = 0.02  # degrees between the faces at edges that are kept flat
 
 
@@ -28,19 +31,22 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
     Returns:
         ``normal_variation`` (E), ``angle_variation``, ``total_mean_curvature`` and ``total_absolute_curvature`` (C, the
         floor of E, measured with the normal cycle), in the length unit of the input; ``energy_over_curvature``;
-        ``area``; ``mean_edge_length``. ``largest_distance`` of vertices from the reference surface and
-        ``largest_distance_relative`` (in mean edges of the input), for vertices that glide on a boundary curve from the
-        nearer of both; ``largest_distance_back`` from vertices of the reference surface to this one;
-        ``largest_boundary_distance`` of gliding vertices from their curve. ``smallest_angle_degrees``;
-        ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces`` against the start. ``largest_planarity``
+        ``area``; ``largest_face_area``; ``mean_edge_length``; ``longest_edge``. ``largest_distance`` of vertices from
+        the reference surface and ``largest_distance_relative`` (in mean edges of the input), for vertices that glide on
+        a boundary curve from the nearer of both; ``largest_distance_back`` from vertices of the reference surface to
+        this one, and ``largest_distance_back_relative``; ``largest_boundary_distance`` of gliding vertices from their
+        curve. ``smallest_angle_degrees``; ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces`` against
+        the start, ``largest_growth`` against the larger of a face's own area and half the mean. ``largest_planarity``
         of the faces kept planar and ``largest_planarity_of_all`` polygons (diagonal distance over mean edge of the
-        face). ``largest_fold_degrees`` of the edges kept flat. ``largest_handle_distance``.
+        face), ``largest_planarity_growth`` of those that are nearly planar. ``largest_fold_degrees`` of the edges kept
+        flat. ``largest_handle_distance``.
     """
     topology = problem.topology
     normalised = unit.apply(vertices)
     distances = problem.near.distances(normalised)[topology.valences > 0]
     back = ReferenceSurface(normalised, topology).closest(problem.near.points).distances
-    ratios = face_areas(vertices, topology) / face_areas(start, topology)
+    areas, lengths = face_areas(vertices, topology), edge_lengths(vertices, topology)
+    ratios, growth = areas / face_areas(start, topology), areas / own_sizes(start, topology)
     turned = (face_normals(vertices, topology) * face_normals(start, topology)).sum(1)
     strayed = vertices.new_zeros(0) if problem.boundary is None else problem.boundary.distances(normalised)
     warps = planarity(vertices, topology)
@@ -53,18 +59,23 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "total_mean_curvature": float(total_mean_curvature(vertices, topology)),
         "total_absolute_curvature": curvature,
         "energy_over_curvature": energy / curvature if curvature > 0.0 else math.nan,
-        "area": float(face_areas(vertices, topology).sum()),
-        "mean_edge_length": float(edge_lengths(vertices, topology).mean()),  # zero where all shrinks to a point
+        "area": float(areas.sum()),
+        "largest_face_area": float(areas.max()),
+        "longest_edge": float(lengths.max()),
+        "mean_edge_length": float(lengths.mean()),  # zero where all shrinks to a point
         "largest_distance": unit.length * float(distances.max()),
         "largest_distance_relative": float(distances.max()) / problem.input_edge,
         "largest_distance_back": unit.length * float(back.max()),
+        "largest_distance_back_relative": float(back.max()) / problem.input_edge,
         "largest_boundary_distance": unit.length * _largest(strayed),
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
         "smallest_area_ratio": float(ratios.min()),
         "largest_area_ratio": float(ratios.max()),
+        "largest_growth": float(growth.max()),
         "flipped_faces": int((turned <= 0.0).sum()),
         "largest_planarity": _largest(warps[problem.planar_faces]),
         "largest_planarity_of_all": _largest(warps[topology.face_sizes > 3]),
+        "largest_planarity_growth": max(0.0, _largest(problem.nearly_planar.growth(vertices, topology))),
         "largest_fold_degrees": math.degrees(_largest(problem.folds(vertices))),
         "largest_handle_distance": unit.length * _largest(problem.pulls.away(normalised)),
     }
@@ -77,21 +88,38 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
     if not problem.has_other_goals:
         promises.append(Promise("E", before["normal_variation"], after["normal_variation"]))
     if problem.near.limits is not None and not problem.near.design_mode:
-        most = max(settings.distance_limit or 0.0, before["largest_distance_relative"])
-        reached = after["largest_distance_relative"]
+        asked = max(settings.distance_limit or 0.0, problem.distance_for_planarity)
+        most, reached = max(asked, before["largest_distance_relative"]), after["largest_distance_relative"]
         remedy = "raise distance_limit, or pull less"
-        promises.append(Promise("distance from the reference", most, reached, unit="mean edges", remedy=remedy))
+        promises.append(
+            Promise("distance from the reference", most, reached, unit=_EDGES, remedy=remedy, of_settings=asked)
+        )
+    if problem.near.limits is not None and not (problem.near.design_mode or not problem.near_input):
+        asked, reached = settings.distance_back, after["largest_distance_back_relative"]
+        most = max(asked, before["largest_distance_back_relative"])
+        remedy = "something is cut off: lower crease_angle, refine, or raise distance_back"
+        name = "distance of the input from the result"
+        promises.append(Promise(name, most, reached, unit=_EDGES, remedy=remedy, of_settings=asked))
+    if settings.boundary == "free" and not problem.has_other_goals:
+        least, remedy = _KEPT_AREA * before["area"], "it has shrunk, not become smoother: raise free_boundary_weight"
+        promises.append(Promise("area", least, after["area"], "at least", remedy=remedy))
     if settings.quality_weight:
-        least = min(math.degrees(settings.smallest_angle), before["smallest_angle_degrees"])
-        reached = after["smallest_angle_degrees"]
-        promises.append(Promise("smallest angle", least, reached, "at least", "degrees"))
+        asked = math.degrees(settings.smallest_angle)
+        least, reached = min(asked, before["smallest_angle_degrees"]), after["smallest_angle_degrees"]
+        promises.append(Promise("smallest angle", least, reached, "at least", "degrees", of_settings=asked))
         area = after["smallest_area_ratio"]
         promises.append(Promise("smallest area against its own", settings.smallest_area, area, "at least"))
-    if not problem.near.design_mode:
-        promises.append(Promise("faces turned over", 0.0, after["flipped_faces"]))
+    if problem.largest_areas is not None:
+        growth, remedy = after["largest_growth"], "raise largest_area, or allow smaller areas"
+        promises.append(Promise("growth of a face, by", settings.largest_area, growth, remedy=remedy))
+    promises.append(Promise("faces turned over", 0.0, after["flipped_faces"], remedy="pull less, or in several steps"))
     if problem.planar_faces.numel() and settings.planarity_weight:
-        remedy = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"
-        promises.append(Promise("planarity of kept faces", PLANAR_PROMISE, after["largest_planarity"], remedy=remedy))
+        promises.append(Promise(_OF_PANELS, PLANAR_PROMISE, after["largest_planarity"], remedy=_FREER))
+    if problem.nearly_planar.faces.numel():
+        growth = after["largest_planarity_growth"]
+        promises.append(
+            Promise("growth of the planarity of nearly planar faces", PLANAR_PROMISE, growth, remedy=_FREER)
+        )
     if problem.flat_edges.numel() and settings.flat_weight:
         remedy = "let the boundary glide or be free, raise distance_limit, or let them fold: flat none"
         reached = after["largest_fold_degrees"]
@@ -101,6 +129,17 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         remedy = "faces would become too small or too thin; allow smaller angles and areas, or pull less"
         promises.append(handle_promise(away, edge, remedy=remedy))
     return promises
+
+
+def located(promises: Sequence[Promise], vertices: Tensor, problem: FairProblem) -> list[Promise]:
+    """The promises, with the panels of ``vertices`` (V, 3) named that are not planar as promised, the worst first."""
+    warps = planarity(vertices, problem.topology)[problem.planar_faces]
+    order = torch.argsort(warps, descending=True, stable=True)[: int((warps > PLANAR_PROMISE).sum())]
+    named = [
+        f"{face} ({warp:.2g})" for face, warp in zip(problem.planar_faces[order[:5]], warps[order[:5]], strict=True)
+    ]
+    where = f"{len(order)} of {len(warps)}, counted from 0: {', '.join(named)}" + ", ..." * (len(order) > 5)
+    return [replace(p, where=where) if p.name == _OF_PANELS and len(order) else p for p in promises]
 
 
 def _largest(values: Tensor) -> float:

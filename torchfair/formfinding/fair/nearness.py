@@ -95,6 +95,20 @@ class Nearness:
         self.allowed = lifted if bool((lifted > self.limits).any()) else self.limits
         self._pulls.version += 1
 
+    def lift(self, vertices: Tensor, most: float = 0.0) -> None:
+        """Lifts limits to where the ``vertices`` (V, 3) are, and to ``most`` mean edges of the input; never below."""
+        if self.limits is None or self.design_mode:
+            return
+        lifted = (self.distances(vertices) * _ROUNDING).clamp_min(most * self._input_edge)
+        self.allowed = torch.maximum(self.limits, lifted)
+        self._pulls.version += 1
+
+    def put_back(self) -> None:
+        """Limits are those of the start again."""
+        if not self.design_mode:
+            self.allowed = self.limits
+            self._pulls.version += 1
+
     def snapshot(self) -> Callable[[], None]:
         """A function that puts back what handles have changed."""
         design_mode, allowed = self.design_mode, self.allowed

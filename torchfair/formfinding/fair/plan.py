@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
+
+from torch import Tensor
 
 from ...projection.layout import State
 from ..job.plan import Plan, Stages
-from .problem import FairProblem
+from .problem import PLANAR_PROMISE, FairProblem
 
 _SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
 _LARGEST_SHARE = 1.3
+_WEAK = 1.0 / 3.0
+_WORTHWHILE = 0.1  # of the largest deviation from planarity at the start: less is better than nothing
+_PLANAR_SHARES = (1.0 / 3.0, 2.0 / 3.0, 1.0, 7.0 / 6.0, 8.0 / 6.0)  # that make faces planar without E
 
 
 class Portion(NamedTuple):
@@ -40,9 +46,38 @@ class FairPlan(Plan):
         self._problem = problem
 
     def stages(self) -> Stages:
-        """All portions, and planarity once more where the last one was not enough, unless every step is taken."""
+        """All portions; where that leaves faces warped or has to raise E, faces are made planar first, E lowered then.
+
+        Of both the better one is kept. Where none has planar faces, the start is, with E lowered as far as no face is
+        warped more than the worst one was.
+        """
         problem, start = self._problem, self.state["vertices"]
-        portions, most = self.planned(), 1.0 if problem.settings.projection.takes_every_step else _LARGEST_SHARE
+        every = problem.settings.projection.takes_every_step
+        problem.most_warped = math.inf
+        energy, warp = problem.energy(start), problem.largest_warp(start)
+        yield from self._lowered(self.planned(), start, _LARGEST_SHARE if not every else 1.0)
+        if every or not problem.makes_planar:
+            return
+        first = self.state["vertices"]
+        if problem.largest_warp(first) <= PLANAR_PROMISE and problem.energy(first) <= energy:
+            return
+        yield from self._made_planar(start)
+        found = [first, self.state["vertices"]]
+        planar = [vertices for vertices in found if problem.largest_warp(vertices) <= PLANAR_PROMISE]
+        if planar:
+            best = min(planar, key=problem.energy)
+        else:
+            best = min(found, key=problem.largest_warp)
+            if problem.largest_warp(best) > _WORTHWHILE * warp:
+                self.state = problem.blocks(start)
+                yield from self._not_warped_more(warp)
+                return
+        problem.takes_for_planarity(best)
+        self.state = problem.blocks(best)
+
+    def _lowered(self, portions: list[Portion], start: Tensor, most: float) -> Stages:
+        """The portions, and planarity once more where the last one was not enough."""
+        problem = self._problem
         while portions:
             share, blur = portions.pop(0)
             problem.pulls.aim(share, start)
@@ -51,6 +86,36 @@ class FairPlan(Plan):
             self.state = problem.blocks(self.state["vertices"])
             if not portions and share < most and not problem.is_planar(problem.placed(self.state)):
                 portions.append(Portion(share + _SHARE_STEP, 1.0))
+
+    def _made_planar(self, start: Tensor) -> Stages:
+        """Makes faces planar near the start, as far away as that takes, and lowers E from there."""
+        problem = self._problem
+        problem.near.lift(start, problem.settings.planar_distance)
+        problem.has_other_goals = True
+        problem.pulls.aim(1.0, start)
+        self.state = problem.blocks(start)
+        for share in _PLANAR_SHARES:
+            yield problem.planar_stage(self.state, share)
+            self.state = problem.blocks(self.state["vertices"])
+            if problem.is_planar(problem.placed(self.state)):
+                break
+        planar = self.state["vertices"]
+        if problem.largest_warp(planar) > PLANAR_PROMISE:
+            return
+        problem.near.lift(planar)
+        yield from self._lowered([Portion(1.0, 1.0)], planar, _LARGEST_SHARE)
+        lowered = self.state["vertices"]
+        if problem.largest_warp(lowered) > PLANAR_PROMISE or problem.energy(lowered) > problem.energy(planar):
+            self.state = problem.blocks(planar)
+
+    def _not_warped_more(self, warp: float) -> Stages:
+        """Lowers E where faces cannot become planar: none becomes worse than the worst one was."""
+        problem = self._problem
+        problem.near.put_back()
+        problem.reconsider()
+        problem.most_warped = warp
+        yield problem.stage(self.state, _WEAK, 1.0, problem.settings.projection)
+        self.state = problem.blocks(self.state["vertices"])
 
     def planned(self) -> list[Portion]:
         """All portions that are known beforehand; one where every step is taken."""

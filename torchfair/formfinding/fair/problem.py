@@ -21,10 +21,12 @@ from ..job.pulls import Pulls
 from ..references import GivenReference
 from .feature_curves import FeatureCurves
 from .flat_edges import edges_to_keep_flat
+from .free_boundary import FreeBoundary
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
-from .planar_faces import faces_to_keep_planar
+from .panel_sizes import growth_terms, own_sizes
+from .planar_faces import NearlyPlanar, faces_to_keep_planar
 from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)
@@ -32,7 +34,9 @@ _LEAST_SAFETY = math.radians(2.0)
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _LARGEST_WARP = 1e-2  # relative planarity above which planarity is imposed in stages
 _PLANARITY_STAGES = 8
+PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
 _PLANAR_ENOUGH = 5e-5
+_NEAR = 1.0  # weight of closeness while faces become planar
 _LARGEST_FOLD = math.radians(2.0)  # of edges kept flat, above which that is imposed in stages
 _FLAT_ENOUGH = math.radians(0.01)
 _MOST_STAGES = 20
@@ -49,13 +53,18 @@ class FairProblem:
         settings: Weights and bounds.
         rim: Curves along boundary and creases, normalised; by default those of the start.
         input_edge: Mean edge length of the input, in which the distance limit is given; that of the start is 1.
+        near_input: Whether the reference is the input; by default where none is given.
 
     Attributes:
         near: Closeness to the reference surface.
         input_edge: Mean edge length of the input.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
         planar_faces: (n,) faces that are kept planar.
+        nearly_planar: Faces that do not become less planar.
+        loose: (V,) bool, corners of boundary and creases that become planar faces may take along.
         flat_edges: (n,) interior edges that are kept flat.
+        most_warped: Relative planarity that no face may exceed that should be planar but cannot become so.
+        distance_for_planarity: How far planar faces may take the mesh from the reference, in mean edges of the input.
         boundary: Curves on which vertices of the boundary and of creases glide; None if none do.
         notes: Decisions taken, in words.
     """
@@ -70,16 +79,22 @@ class FairProblem:
         *,
         rim: FeatureCurves | None = None,
         input_edge: float = 1.0,
+        near_input: bool | None = None,
     ) -> None:
         self.vertices, self.topology, self.pulls, self.settings = vertices, topology, pulls, settings
         self.notes: list[str] = []
         self._has_other_reference, self.has_other_goals = reference is not None, False
+        self.near_input = reference is None if near_input is None else near_input
         self.input_edge, self._curves = input_edge, rim or feature_curves(vertices, topology, settings)
         self.corners = self._curves.rim.corners
         self._tell_of_creases()
         self.planar_faces = self._planar_faces()
+        self.nearly_planar = self._nearly_planar()
+        self.loose = self._loose_corners()
         self.flat_edges = self._flat_edges()
         self.boundary = self._gliding_boundary()
+        self._free = FreeBoundary(vertices, topology, self._curves, pulls)
+        self.most_warped, self.distance_for_planarity = math.inf, 0.0
         limit = settings.distance_limit
         self.near = Nearness(
             vertices,
@@ -101,9 +116,11 @@ class FairProblem:
     def snapshot(self) -> Callable[[], None]:
         """A function that puts back what handles have changed."""
         put_back_near = self.near.snapshot()
+        of_planarity = self.has_other_goals, self.most_warped, self.distance_for_planarity
 
         def put_back() -> None:
             put_back_near()
+            self.has_other_goals, self.most_warped, self.distance_for_planarity = of_planarity
             self.__dict__.pop("guard", None)
 
         return put_back
@@ -151,13 +168,41 @@ class FairProblem:
             *self._energy(blur),
             *self.near.terms(weight=settings.closeness_weight, barrier_weight=settings.quality_weight),
             *self._boundary(),
+            *self._loosely(),
             *self._fairness(),
             *self._quality(),
             *self.pulls.terms(weight=settings.handle_weight),
             *c.planarity_terms(self.topology, self.planar_faces, weight=_raised(settings.planarity_weight, share)),
+            *self.nearly_planar.terms(self.topology, weight=_raised(settings.planarity_weight, share)),
             *self._flat(share),
             *self._directions(),
         ]
+
+    def planar_terms(self, share: float) -> list[ElementTerm]:
+        """Element terms of a stage that makes faces planar near where they are, whatever becomes of E."""
+        settings = self.settings
+        return [
+            *self.near.terms(weight=_NEAR, barrier_weight=settings.quality_weight),
+            *self._boundary(),
+            *self._loosely(),
+            *c.displacement_fairness_terms(self.vertices, self.topology, weight=settings.fairness_weight),
+            *self._quality(),
+            *self.pulls.terms(weight=settings.handle_weight),
+            *c.planarity_terms(self.topology, self.planar_faces, weight=_raised(settings.planarity_weight, share)),
+            *self._flat(share),
+        ]
+
+    def planar_stage(self, state: State, share: float) -> Stage:
+        """A run of guided projection with :meth:`planar_terms`."""
+        return Stage(
+            name="planar",
+            blocks={"vertices": state["vertices"]},
+            terms=lambda: self.planar_terms(share),
+            version=(self.pulls.version, share),
+            settings=self.settings.stage(),
+            fixed={"vertices": self.stays() | self.pulls.held},
+            guard=self.admits,
+        )
 
     def is_planar(self, vertices: Tensor) -> bool:
         """Whether faces kept planar and edges kept flat are well within the tolerances that the job promises."""
@@ -165,7 +210,39 @@ class FairProblem:
         settings, folded = self.settings, self.folds(vertices)
         if settings.planarity_weight and bool((warped > _PLANAR_ENOUGH).any()):
             return False
+        if bool((self.nearly_planar.growth(vertices, self.topology) > _PLANAR_ENOUGH).any()):
+            return False
         return not settings.flat_weight or not bool((folded > _FLAT_ENOUGH).any())
+
+    @property
+    def makes_planar(self) -> bool:
+        """Whether faces are asked to be planar that need not be so at the start."""
+        settings = self.settings
+        return settings.planar not in ("keep", "none") and bool(settings.planarity_weight and self.planar_faces.numel())
+
+    def largest_warp(self, vertices: Tensor) -> float:
+        """Largest relative planarity of the faces kept planar, with gliding ``vertices`` (V, 3) put in place."""
+        warped = planarity(self.placed({"vertices": vertices}), self.topology)[self.planar_faces]
+        return float(warped.max()) if warped.numel() else 0.0
+
+    def energy(self, vertices: Tensor) -> float:
+        """E, with gliding ``vertices`` (V, 3) put in place."""
+        return self.guard.energy({"vertices": vertices})
+
+    def takes_for_planarity(self, vertices: Tensor) -> None:
+        """Takes in what the best ``vertices`` (V, 3) with planar faces cost: distance from the reference, and E."""
+        self.has_other_goals = True
+        self.near.put_back()
+        limits, distances = self.near.limits, self.near.distances(self.placed({"vertices": vertices}))
+        if limits is None or not bool((distances > limits).any()):
+            return
+        self.near.lift(vertices)
+        self.distance_for_planarity = self.settings.planar_distance
+        farthest = float(distances[distances > limits].max()) / self.input_edge
+        self.notes.append(
+            f"planar faces take the mesh {farthest:.3g} mean edge lengths from the reference surface, beyond the "
+            "distance limit: planar_distance 0 to keep that"
+        )
 
     def folds(self, vertices: Tensor) -> Tensor:
         """(n,) angles between the normals at the edges kept flat, radians."""
@@ -190,13 +267,39 @@ class FairProblem:
             "free": torch.zeros_like(isolated),
         }
         fixed = kinds[self.settings.boundary] | isolated | (self._curves.corners & ~self.topology.is_boundary_vertex)
-        return fixed & ~self.pulls.pulled
+        return fixed & ~self.pulls.pulled & ~self.loose
 
     def _planar_faces(self) -> Tensor:
         faces = faces_to_keep_planar(self.vertices, self.topology, self.settings)
         if faces.numel() and isinstance(self.settings.planar, str):
-            self.notes.append(f"{faces.numel()} of {self.topology.num_faces} faces are kept planar")
+            words = "are kept planar" if self.settings.planar == "keep" else "are to be planar"
+            self.notes.append(f"{faces.numel()} of {self.topology.num_faces} faces {words}")
         return faces
+
+    def _nearly_planar(self) -> NearlyPlanar:
+        settings = self.settings
+        found = NearlyPlanar.of(self.vertices, self.topology, settings, self.planar_faces)
+        if not found.faces.numel() or not settings.planarity_weight:
+            return found.none()
+        keeps = settings.planar == "keep"
+        words = "do not become less planar" if keeps else "are let go"
+        self.notes.append(
+            f"{found.faces.numel()} nearly planar faces (within {settings.planar_reach:g}, at most "
+            f"{float(found.most.max()):.2g}) {words}"
+        )
+        return found if keeps else found.none()
+
+    def _loose_corners(self) -> Tensor:
+        """Those of faces that are to become planar: where all their corners stayed, few could."""
+        settings, topology = self.settings, self.topology
+        corners = self.corners if settings.boundary == "glide" else torch.zeros_like(self.corners)
+        if not self.makes_planar or settings.projection.takes_every_step:
+            return torch.zeros_like(corners)
+        warped = torch.zeros(topology.num_faces, dtype=torch.bool)
+        chosen = planarity(self.vertices, topology)[self.planar_faces] > settings.planar_tolerance
+        warped[self.planar_faces[chosen]] = True
+        of_warped = torch.zeros_like(corners).index_fill(0, topology.corners[warped[topology.corner_faces]], True)
+        return of_warped & (corners | self._curves.stay)
 
     def _tell_of_creases(self) -> None:
         count, stay = int((self._curves.edges >= 0).sum()), int(self._curves.stay.sum())
@@ -248,7 +351,7 @@ class FairProblem:
         if not glides and not self._curves.points:
             return None
         beside = self.topology.interior_edge_faces[self.flat_edges].reshape(-1)
-        panels = torch.cat([self.planar_faces, beside])
+        panels = torch.cat([self.planar_faces, self.nearly_planar.faces, beside])
         loose = self.topology.corners[torch.isin(self.topology.corner_faces, panels)]
         held = (self.topology.is_boundary_vertex & glides) | self._curves.on_creases
         return GlidingBoundary(held, self._curves.curves(boundary=glides), self.pulls, loose)
@@ -263,23 +366,40 @@ class FairProblem:
         return [*terms, *self._curves.fairness_terms(self.topology, weight=weight)]
 
     def _boundary(self) -> list[ElementTerm]:
+        free = self._free.terms(weight=self.settings.free_boundary_weight) if self.settings.boundary == "free" else []
         if self.boundary is None or self.boundary.feet is None:
-            return []
+            return free
         gliding = c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight)
         weights = self.boundary.glides.to(self.vertices)
-        return [replace(term, element_weights=weights) for term in gliding]
+        return [*free, *(replace(term, element_weights=weights) for term in gliding)]
+
+    def _loosely(self) -> list[ElementTerm]:
+        """Draws corners that may move to where they were."""
+        chosen = torch.nonzero(self.loose & ~self.pulls.pulled).squeeze(1)
+        places = self.vertices[chosen]
+        return c.handle_terms(chosen, places, weight=self.settings.boundary_weight, name="corners")
 
     def _quality(self) -> list[ElementTerm]:
         settings = self.settings
         angles, smallest = corner_angles(self.vertices, self.topology), self._smallest_angle
         safe = angles.clamp(max=max(_SAFE_ANGLE, 2.0 * smallest)).clamp_min(smallest + _LEAST_SAFETY)
-        weight = settings.quality_weight
+        weight, most = settings.quality_weight, self.largest_areas
         return [
+            *([] if most is None else growth_terms(self.topology, most, weight=weight)),
             *c.corner_angle_terms(self.topology, smallest, safe, weight=weight),
             *c.face_area_terms(
                 self.topology, face_areas(self.vertices, self.topology), smallest=settings.smallest_area, weight=weight
             ),
         ]
+
+    @property
+    def largest_areas(self) -> Tensor | None:
+        """(F,) that no face exceeds; handles may stretch faces as they need."""
+        settings = self.settings
+        if not (settings.quality_weight and settings.largest_area) or self.pulls.everywhere:
+            return None
+        bounded = settings.largest_area < math.inf and not bool(self.pulls.pulled.any())
+        return settings.largest_area * own_sizes(self.vertices, self.topology) if bounded else None
 
     @cached_property
     def _smallest_angle(self) -> float:
@@ -300,6 +420,8 @@ class FairProblem:
         where handles have been.
         """
         kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
+        if kept and self.most_warped < math.inf:
+            kept = self.largest_warp(trial["vertices"]) <= self.most_warped
         rises = self.has_other_goals or self.near.is_on_the_way_back
         return kept and (rises or self.guard.keeps_energy(state, trial))
 
@@ -313,7 +435,9 @@ class FairProblem:
             self.placed,
             smallest_angle=bounded * self._smallest_angle,
             smallest_area=bounded * self.settings.smallest_area,
+            largest_areas=self.largest_areas,
             from_last=self.near.design_mode or self.pulls.everywhere,
+            may_turn=self.pulls.everywhere,
         )
 
 

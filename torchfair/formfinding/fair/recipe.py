@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
+import torch
 from torch import Tensor
 
-from ...projection import Callback
+from ...errors import MeshError
+from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ...topology import Topology
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
-from ..references import GivenReference, normalised_reference
+from ..references import GivenReference, normalised_reference, refuse_far_reference
 from .feature_curves import FeatureCurves
-from .measures import fair_measures, fair_promises
+from .measures import fair_measures, fair_promises, located
 from .plan import FairPlan
 from .problem import FairProblem, feature_curves
 from .refinement import refined
@@ -29,6 +31,8 @@ class FairRecipe(Recipe[FairSettings]):
         handles: Likewise; more of them may be pulled later.
         rim: Curves along boundary and creases; by default those of the start.
         input_edge: Mean edge length in which the distance limit is given; by default that of the start.
+        near_input: Whether the reference is the input; by default where none is given.
+        fixed: Vertices that stay where they are.
 
     Attributes:
         reference: The surface to stay close to: vertices and topology, or a function.
@@ -46,9 +50,13 @@ class FairRecipe(Recipe[FairSettings]):
         settings: FairSettings | None = None,
         rim: FeatureCurves | None = None,
         input_edge: float | None = None,
+        near_input: bool | None = None,
+        fixed: Iterable[int] = (),
     ) -> None:
         super().__init__(vertices, topology, settings or FairSettings())
         surface = None if reference is None else normalised_reference(reference, self.unit)
+        if surface is not None and input_edge is None:
+            refuse_far_reference(surface, self.start, self.topology, most=self.settings.reference_distance)
         self.reference = reference or (self.given, self.topology)
         self.rim = rim or feature_curves(self.given, self.topology, self.settings)
         self.input_edge = input_edge or self.unit.length
@@ -60,9 +68,24 @@ class FairRecipe(Recipe[FairSettings]):
             self.settings,
             rim=self.rim.mapped(self.unit.apply),
             input_edge=self.input_edge / self.unit.length,
+            near_input=near_input,
         )
         self.notes = self.problem.notes
+        self._fix(fixed, handles or {})
         self.pull(handles or {})
+
+    def _fix(self, fixed: Iterable[int], handles: Iterable[int]) -> None:
+        """Holds vertices where they are; MeshError for what is no vertex, or is pulled."""
+        numbers = sorted(set(fixed))
+        wrong = [number for number in numbers if not 0 <= number < self.topology.num_vertices]
+        if wrong:
+            raise MeshError(f"fixed: vertices are numbered 0 to {self.topology.num_vertices - 1}, got {wrong[:5]}")
+        both = sorted(set(numbers) & set(handles))
+        if both:
+            raise MeshError(f"vertices cannot be fixed and pulled at once: {both[:5]}")
+        if numbers:
+            self.pulls.hold(torch.tensor(numbers, dtype=torch.int64))
+            self.notes.append(f"{len(numbers)} vertices are fixed")
 
     def take_settings(self, settings: FairSettings) -> None:
         """Takes other weights."""
@@ -116,6 +139,11 @@ class FairRecipe(Recipe[FairSettings]):
         """See ``fair_promises``."""
         return fair_promises(self.problem, before, after)
 
+    def level(self, state: State, before: dict[str, float], runs: list[ProjectionResult], like: Tensor) -> Level:
+        """What is returned of a state, with the panels named that break promises."""
+        level = super().level(state, before, runs, like)
+        return replace(level, promises=located(level.promises, self.vertices(state), self.problem))
+
     def refined(self, state: State) -> FairRecipe:
         """By Loop's or Catmull and Clark's scheme, near the same reference surface."""
         return refined(self, self.vertices(state))
@@ -127,6 +155,7 @@ def minimise_normal_variation(
     *,
     reference: GivenReference | None = None,
     handles: Mapping[int, Sequence[float]] | None = None,
+    fixed: Iterable[int] = (),
     levels: int = 0,
     settings: FairSettings | None = None,
     callback: Callback | None = None,
@@ -149,6 +178,7 @@ def minimise_normal_variation(
             Vertices that start farther from it than the limit may not go farther away than they are.
         handles: Targets by vertex number. Where a target is farther from the reference surface than the
             limit, the reference is given up (design mode, paper Fig. 12) and a note says so.
+        fixed: Numbers of vertices that stay where they are.
         levels: How often to refine the result and lower E again: triangles by Loop's scheme, others by Catmull and
             Clark's. Reference and boundary curves stay; handles, and what is planar or flat, are carried on.
         settings: Weights, bounds and tolerances.
@@ -162,15 +192,17 @@ def minimise_normal_variation(
 
     Raises:
         ShapeError: vertices are not ``(V, 3)``, or a handle is not a point.
-        MeshError: vertices are not finite, a face has no area, or a handle is no vertex.
+        MeshError: vertices are not finite, a face has no area, a handle or a fixed vertex is none or one is both, or
+            the reference is farther away than ``settings.reference_distance``.
 
     Example::
 
         result = minimise_normal_variation(vertices, topology)
         print(result.before["normal_variation"], result.after["normal_variation"], result.holds)
     """
+    chosen = list(fixed)
 
     def begin() -> FairRecipe:
-        return FairRecipe(vertices, topology, reference=reference, handles=handles, settings=settings)
+        return FairRecipe(vertices, topology, reference=reference, handles=handles, fixed=chosen, settings=settings)
 
     return solved(begin, vertices, levels=levels, callback=callback)

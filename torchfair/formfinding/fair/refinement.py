@@ -42,6 +42,7 @@ def refined(recipe: FairRecipe, vertices: Tensor) -> FairRecipe:
         settings=_carried(step, recipe.problem, recipe.settings),
         rim=rim,
         input_edge=recipe.input_edge,
+        near_input=recipe.problem.near_input,
     )
     finer.pull(recipe.handles)
     finer.pulls.hold(torch.nonzero(pulls.held).squeeze(1))

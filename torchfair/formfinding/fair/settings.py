@@ -42,16 +42,20 @@ class FairSettings:
             that glides is left to its curves.
         distance_limit: No vertex goes farther from the reference surface than this, or on a boundary that glides
             from its curve, which bulges over the chords; None for no limit.
+        distance_back: No vertex of the input is farther from the result than this; said where it is not so.
+        reference_distance: A reference is refused if a vertex of the start is farther from it than this.
         fairness_weight: Weight of an eighth of squared second differences (between quads, and along the boundary) and
             of half of squared umbrella vectors (elsewhere).
         second_differences: Whether fairness is that of second differences along all mesh polylines, the paper's, on
             triangle meshes too.
         handle_weight: Weight of half the squared distance of handles from their targets.
         boundary: ``"glide"`` lets boundary vertices slide on smooth curves through all of them and keeps corners,
-            where curves end; ``"fixed"`` keeps them where they are, ``"free"`` leaves them to closeness alone. Between
+            where curves end; ``"fixed"`` keeps them where they are, ``"free"`` lets them leave their curves. Between
             two corners with no vertex between them the curve is straight.
         boundary_weight: Weight of half the squared distance from the boundary curves. In the result gliding vertices
             lie on them exactly, but for those of faces that are kept planar.
+        free_boundary_weight: Weight of half the squared distance of a free boundary from its curves, and of its corners
+            from their places; with 0 a sheet shrinks, since E falls with its size.
         corner_angle: The boundary has a corner where it turns by more than this, radians.
         crease_angle: Interior edges with a dihedral angle above this are creases, whose vertices slide on smooth curves
             and whose corners stay, radians; 0 for no creases.
@@ -59,6 +63,9 @@ class FairSettings:
             three corners, ``"none"``, or face numbers.
         planar_tolerance: A polygon arrives planar when its diagonals are nearer than this fraction of its
             mean edge length.
+        planar_reach: With ``"keep"``, polygons that are nearly planar, by less than this, do not become less so.
+        planar_distance: Where faces cannot become planar within the distance limit, they may go so far from the
+            reference surface; 0 to keep the limit.
         planarity_weight: Weight of half the squared distance of diagonals.
         flat: Edges that stay flat: ``"keep"`` for the diagonals of panels that arrive as coplanar triangles, ``"all"``
             for all edges between triangles that arrive flat, ``"none"``, or numbers of interior edges. Coplanar
@@ -72,6 +79,8 @@ class FairSettings:
         direction_weight: Weight of half the squared sideways components of edges that keep their directions.
         smallest_angle: No corner angle falls below this (or below the smallest of the input), radians.
         smallest_area: No face falls below this fraction of its area.
+        largest_area: No face grows above this many times its area, or half the mean area where that is more, unless
+            handles stretch it.
         quality_weight: Weight of half the squared barriers before those bounds.
         smoothing: ``l l*`` below this is treated as flat.
         continuation: Factors of ``smoothing`` in stages before the last, falling; empty for the last stage alone.
@@ -83,15 +92,20 @@ class FairSettings:
     energy_weight: float = 1.0
     closeness_weight: float = 100.0
     distance_limit: float | None = setting(0.05, unit="mean edges")
+    distance_back: float = setting(0.5, unit="mean edges")
+    reference_distance: float = setting(3.0, unit="mean edges")
     fairness_weight: float = 0.3
     second_differences: bool = False
     handle_weight: float = 1e4
     boundary: Boundary = "glide"
     boundary_weight: float = 1e4
+    free_boundary_weight: float = 30.0
     corner_angle: float = setting(math.radians(40.0), unit="radians")
     crease_angle: float = setting(math.radians(40.0), unit="radians")
     planar: Planar | tuple[int, ...] = "keep"
     planar_tolerance: float = 1e-3
+    planar_reach: float = 5e-3
+    planar_distance: float = setting(0.5, unit="mean edges")
     planarity_weight: float = 1e6
     flat: Flat | tuple[int, ...] = "keep"
     flat_tolerance: float = 1e-3
@@ -100,6 +114,7 @@ class FairSettings:
     direction_weight: float = 30.0
     smallest_angle: float = setting(math.radians(10.0), unit="radians")
     smallest_area: float = 0.2
+    largest_area: float = 3.0
     quality_weight: float = 0.1
     smoothing: float = 1e-2
     continuation: tuple[float, ...] = (10.0, 3.0)
@@ -143,6 +158,7 @@ class FairSettings:
             second_differences=True,
             handle_weight=w_handle,
             boundary_weight=w_prox,
+            free_boundary_weight=0.0,
             crease_angle=0.0,
             planarity_weight=0.0,
             flat_weight=1.0,
@@ -164,8 +180,18 @@ class FairSettings:
             )
         if isinstance(self.flat, str) and self.flat not in get_args(Flat):
             raise SettingsError(f"flat must be one of {', '.join(get_args(Flat))} or edge numbers, got {self.flat!r}")
-        for name in ("smallest_angle", "smallest_area", "planar_tolerance", "flat_tolerance", "corner_angle"):
+        for name in (
+            "smallest_angle",
+            "smallest_area",
+            "planar_tolerance",
+            "planar_distance",
+            "flat_tolerance",
+            "corner_angle",
+        ):
             check_number(name, getattr(self, name))
+        check_number("largest_area", self.largest_area, least=1.0)
+        check_number("reference_distance", self.reference_distance, above=True)
+        check_number("distance_back", self.distance_back, above=True)
         check_number("crease_angle", self.crease_angle, most=math.pi)
         check_number("smoothing", self.smoothing, above=True, finite=True)
         factors = self.continuation if isinstance(self.continuation, Iterable) else (self.continuation,)

@@ -95,6 +95,17 @@ class BoundaryTrack:
         parameters[new_boundary_vertices(refinement)] = torch.remainder(start + 0.5 * there, 1.0)
         return BoundaryTrack(refinement.topology, self.curves, parameters, refinement.carry_vertex_labels(self.corners))
 
+    def renumbered(self, topology: Topology, numbers: Tensor) -> BoundaryTrack:
+        """On another mesh with the same boundary, whose vertices have the ``numbers`` (V,) there; -1 inside."""
+        old = torch.nonzero(self.curve_numbers >= 0).squeeze(1)
+        there = numbers[old]
+        curve_numbers, parameters, corners = (
+            known.new_zeros(topology.num_vertices).index_put((there,), known[old])
+            for known in (self.curve_numbers, self.parameters, self.corners)
+        )
+        curves = [self.curves[int(curve_numbers[loop[0]])] for loop in topology.boundary_loops()]
+        return BoundaryTrack(topology, curves, parameters, corners)
+
     def spans(self, vertices: Tensor) -> Tensor:
         """(n,) number of the span that boundary ``vertices`` (n,) lie on, among those of all curves in a row."""
         first, result = 0, torch.zeros_like(vertices)

@@ -90,7 +90,7 @@ class FormFollower:
     def _guard(self, vertices: Tensor) -> FaceGuard:
         problem = self._problem
         least = min(_LEAST_ANGLE, problem.settings.least_angle, problem.smallest_angle(vertices))
-        return FaceGuard(problem.topology, lambda state: state["vertices"], least)
+        return FaceGuard(problem.topology, lambda state: state["vertices"], least, problem.steepest(vertices))
 
 
 class SettlingPlan(FormPlan):

@@ -15,6 +15,7 @@ from ...energies import (
     total_mean_curvature,
 )
 from ...geometry import corner_angles, edge_lengths, face_normals, vertex_normals
+from ...geometry.planarity import planarity
 from ...measuring import fold_measures
 from ...measuring.trust import LARGEST_DIHEDRAL, explained_variation
 from ...topology import Topology
@@ -23,6 +24,7 @@ from .settings import FormSettings
 
 _ON_THE_CURVES = 1e-6  # mean edge lengths
 _TANGENT = 1.0  # degrees
+_NEARLY_PLANAR = 5e-3  # relative planarity
 
 
 def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Tensor, away: Tensor) -> dict[str, float]:
@@ -38,10 +40,10 @@ def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Te
     Returns:
         ``total_absolute_curvature``, ``total_frobenius_curvature``, ``normal_variation``, ``angle_variation``,
         ``total_mean_curvature`` (length), ``energy_over_curvature``, ``area``, ``mean_edge_length``,
-        ``smallest_angle_degrees``, ``largest_dihedral_angle_degrees``, ``folded_faces`` that look away from what
-        surrounds them, ``self_intersections`` (pairs of faces that meet without being neighbours),
-        ``largest_tilt_degrees`` between prescribed normals and those at the boundary (:class:`BoundaryNormals`),
-        ``largest_boundary_distance`` and ``largest_handle_distance``.
+        ``smallest_angle_degrees``, ``largest_planarity_of_all`` faces, ``largest_dihedral_angle_degrees``,
+        ``folded_faces`` that look away from what surrounds them, ``self_intersections`` (pairs of faces that meet
+        without being neighbours), ``largest_tilt_degrees`` between prescribed normals and those at the boundary
+        (:class:`BoundaryNormals`), ``largest_boundary_distance`` and ``largest_handle_distance``.
     """
     folds = fold_measures(vertices, topology)
     energy, curvature = folds["normal_variation"], folds["total_absolute_curvature"]
@@ -55,6 +57,7 @@ def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Te
         "area": folds["area"],
         "mean_edge_length": float(edge_lengths(vertices, topology).mean()),
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
+        "largest_planarity_of_all": float(planarity(vertices, topology).max()),
         "folded_faces": folded_faces(vertices, topology),
         **{name: folds[name] for name in ("largest_dihedral_angle_degrees", "self_intersections")},
         "largest_tilt_degrees": math.degrees(_largest_tilt(vertices, topology, normals)),
@@ -64,7 +67,13 @@ def form_measures(vertices: Tensor, topology: Topology, rim: Tensor, normals: Te
 
 
 def form_promises(
-    settings: FormSettings, before: Mapping[str, float], after: Mapping[str, float], *, handles: bool, normals: bool
+    settings: FormSettings,
+    before: Mapping[str, float],
+    after: Mapping[str, float],
+    *,
+    handles: bool,
+    normals: bool,
+    remesh: bool = False,
 ) -> list[Promise]:
     """What is asked of a mesh, and what its measures are.
 
@@ -74,6 +83,7 @@ def form_promises(
         after: Measures of the mesh.
         handles: Whether there are any.
         normals: Whether any are prescribed.
+        remesh: Whether triangles may be replaced.
     """
     edge, promises = before["mean_edge_length"], []
     if not (handles or normals or before["largest_boundary_distance"] > _ON_THE_CURVES * edge):
@@ -86,6 +96,7 @@ def form_promises(
     )
     least = min(math.degrees(settings.least_angle), 0.5 * before["smallest_angle_degrees"])
     remedy = "raise fairness, allow more iterations, or start from more even triangles"
+    remedy = remedy if remesh else f"let triangles be replaced (remesh), {remedy}"
     promises.append(
         Promise("smallest angle", least, after["smallest_angle_degrees"], "at least", "degrees", remedy=remedy)
     )
@@ -99,6 +110,15 @@ def form_promises(
         remedy = "pull less, or allow more iterations"
         promises.append(handle_promise(after["largest_handle_distance"], edge, remedy=remedy))
     return promises
+
+
+def warp_notes(before: Mapping[str, float], after: Mapping[str, float]) -> list[str]:
+    """Says that faces were nearly planar and no longer are, in measures of both: C does not ask for that."""
+    had, have = before["largest_planarity_of_all"], after["largest_planarity_of_all"]
+    if not (had < _NEARLY_PLANAR < have):
+        return []
+    words = f"faces were planar within {had:.2g} of their edges and are warped by up to {have:.2g} now: C is lowered "
+    return [f"{words}on triangles, whatever becomes of faces; torchfair fair --planar quads makes them planar again"]
 
 
 def fold_promises(after: Mapping[str, float]) -> list[Promise]:

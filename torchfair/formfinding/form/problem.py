@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -11,9 +12,10 @@ from torch import Tensor
 from ... import constraints as c
 from ..._graph import graph_laplacian
 from ...energies import total_absolute_curvature
-from ...geometry import corner_angles, vertex_normals
+from ...geometry import corner_angles, dihedral_angles, vertex_normals
 from ...geometry.spline_curves import SplineCurves
 from ...linear import Factor, factorise
+from ...measuring.trust import LARGEST_DIHEDRAL
 from ...normalisation import Normalisation
 from ...projection import ElementTerm, LogAbsolute, SmoothAbsolute
 from ...topology import Topology
@@ -182,6 +184,11 @@ class FormProblem:
     def smallest_angle(self, vertices: Tensor) -> float:
         """Smallest corner angle, radians."""
         return float(corner_angles(vertices, self.topology).min())
+
+    def steepest(self, start: Tensor) -> float:
+        """Largest dihedral angle, radians, that is no fold from this start."""
+        angles = dihedral_angles(start, self.topology).abs()
+        return max(math.radians(LARGEST_DIHEDRAL), float(angles.max()) if angles.numel() else 0.0)
 
     # ---- terms -----------------------------------------------------------------------------------------
 

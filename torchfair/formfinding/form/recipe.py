@@ -9,16 +9,17 @@ from torch import Tensor
 
 from ...curves import ClosedCurve
 from ...energies import total_absolute_curvature
-from ...errors import SettingsError
-from ...projection import Callback
+from ...errors import MeshError, SettingsError
+from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ...subdivision import catmull_clark, loop
 from ...topology import Topology
 from ...triangulation import triangulate
 from ..handles import refuse_unreachable_handles
 from ..job import JobResult, Level, Plan, Promise, Recipe, Stage, solved
+from .even_mesh import even_mesh
 from .follower import FormFollower, SettlingPlan
-from .measures import form_measures, form_promises
+from .measures import form_measures, form_promises, warp_notes
 from .other_starts import Start, other_starts
 from .plan import FormPlan
 from .problem import FormProblem, staying_vertices
@@ -35,7 +36,7 @@ class FormRecipe(Recipe[FormSettings]):
         handles: Likewise; more of them may be pulled later.
         rim: Curves and normals of a coarser mesh, carried on to its refinement, instead of ``curves`` and ``normals``;
             the vertices are then taken to be near the solution.
-        starts: See :func:`minimise_absolute_curvature`.
+        starts, remesh: See :func:`minimise_absolute_curvature`.
 
     Attributes:
         rim: What is asked along the boundary.
@@ -54,10 +55,11 @@ class FormRecipe(Recipe[FormSettings]):
         settings: FormSettings | None = None,
         rim: Rim | None = None,
         starts: int = 1,
+        remesh: bool = False,
     ) -> None:
         super().__init__(vertices, topology, settings or FormSettings())
         check_rim(self.given, self.topology, curves)
-        self._starts = starts
+        self._starts, self._remesh = starts, remesh
         self._input, self._nearby, topology = self.given, rim is not None, self.topology
         self.rim = rim or Rim.of(self.given, topology, curves, normals, self.settings.corner_angle)
         self.start_at(self.rim.track.positions(self.given))
@@ -140,7 +142,13 @@ class FormRecipe(Recipe[FormSettings]):
     def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
         """See ``form_promises``."""
         handles, normals = bool(self.pulls.pulled.any()), self.problem.has_tangent_planes
-        return form_promises(self.settings, before, after, handles=handles, normals=normals)
+        return form_promises(self.settings, before, after, handles=handles, normals=normals, remesh=self._remesh)
+
+    def level(self, state: State, before: dict[str, float], runs: list[ProjectionResult], like: Tensor) -> Level:
+        """What is returned of a state; notes where faces have lost their planarity."""
+        level = super().level(state, before, runs, like)
+        self.notes += warp_notes(level.before, level.after)
+        return level
 
     def refined(self, state: State) -> FormRecipe:
         """By Loop or Catmull-Clark subdivision; new boundary vertices are put on the curves, by arc length."""
@@ -150,9 +158,28 @@ class FormRecipe(Recipe[FormSettings]):
         step = scheme(self.topology, boundary="interpolate", corners=track.corners)
         rim = self.rim._replace(track=track).refined(step)
         start = rim.track.positions(step.apply(vertices))
-        finer = FormRecipe(start, step.topology, handles=self.handles, settings=self.settings, rim=rim)
+        handles, remesh = self.handles, self._remesh
+        finer = FormRecipe(start, step.topology, handles=handles, settings=self.settings, rim=rim, remesh=remesh)
         finer.pulls.hold(torch.nonzero(self.pulls.held).squeeze(1))
         return finer
+
+    def renewed(self, state: State) -> FormRecipe | None:
+        """With even triangles, if they may be replaced; boundary vertices, handles and held ones keep their places."""
+        if not self._remesh:
+            return None
+        pulls, vertices = self.pulls, self.vertices(state)
+        try:
+            even = even_mesh(vertices, self.topology, pulls.pulled | pulls.held, self.topology.num_vertices)
+            rim = self.rim._replace(track=self.rim.track.updated(vertices)) if self.problem.glides else self.rim
+            handles = {int(even.numbers[vertex]): place for vertex, place in self.handles.items()}
+            other = FormRecipe(
+                even.vertices, even.topology, handles=handles, settings=self.settings,
+                rim=rim.renumbered(even.topology, even.numbers), remesh=True,
+            )  # fmt: skip
+        except MeshError:
+            return None
+        other.pulls.hold(even.numbers[torch.nonzero(pulls.held).squeeze(1)])
+        return other
 
     def _on_the_rim(self, vertices: Tensor) -> Tensor:
         return self.rim.nearest(vertices, glides=self.problem.glides)
@@ -167,6 +194,7 @@ def minimise_absolute_curvature(
     handles: Mapping[int, Sequence[float]] | None = None,
     levels: int = 0,
     starts: int = 1,
+    remesh: bool = False,
     settings: FormSettings | None = None,
     callback: Callback | None = None,
 ) -> JobResult[Level]:
@@ -201,6 +229,9 @@ def minimise_absolute_curvature(
             on its convex hull, above and below, are bumped up and down, of least area, or have random bumps. The best
             is refined; all are listed with their C in the notes. Where a handle is farther than a mean edge from its
             vertex, the surface is also made to follow it in small steps.
+        remesh: Whether the triangles may be replaced where a promise is not kept: the surface is given even ones
+            between the same boundary vertices, and the job goes on from there, four times at most, until all promises
+            are kept; else the one with fewest broken promises is the result. Vertices have other numbers then.
         settings: Weights, smoothing and tolerances.
         callback: Called with every iteration record, whose quantities hold ``total_absolute_curvature``; returning
             True stops. Ctrl-C, or a function that raises KeyboardInterrupt, returns the best mesh so far, on the finest
@@ -213,7 +244,7 @@ def minimise_absolute_curvature(
         ShapeError: vertices or normals are not ``(V, 3)``, or a handle is not a point.
         MeshError: vertices are not finite, a face has no area, the mesh is closed, curves cross or do not fit the
             boundary, or a handle is no vertex or pulls a vertex of the boundary that stays.
-        SettingsError: ``starts`` is below 1.
+        SettingsError: ``starts`` is below 1, or ``remesh`` is asked for a mesh that has other faces than triangles.
 
     Example::
 
@@ -223,10 +254,13 @@ def minimise_absolute_curvature(
     """
     if starts < 1:
         raise SettingsError(f"starts must be at least 1, got {starts}")
+    if remesh and not topology.is_triangular:
+        raise SettingsError("remesh replaces triangles, and the mesh has other faces: cut these, or leave remesh out")
 
     def begin() -> FormRecipe:
         return FormRecipe(
-            vertices, topology, curves=curves, normals=normals, handles=handles, settings=settings, starts=starts
-        )
+            vertices, topology, curves=curves, normals=normals, handles=handles, settings=settings, starts=starts,
+            remesh=remesh,
+        )  # fmt: skip
 
     return solved(begin, vertices, levels=levels, callback=callback)

@@ -13,7 +13,7 @@ from ...errors import MeshError, ShapeError
 from ...subdivision import Refinement
 from ...topology import Topology
 from .boundary_track import BoundaryTrack, new_boundary_vertices
-from .starting.rims import refuse_crossing_rims
+from .starting.rims import refuse_crossing_rims, segment_distances
 
 _SAMPLES = 200  # of a curve
 _NEAR = 0.15  # of the extent of a boundary loop
@@ -54,6 +54,13 @@ class Rim(NamedTuple):
         """On the finer mesh: new vertices lie on the curves, and have the mean normal of both ends."""
         return Rim(self.track.refined(refinement), _refined_normals(self.normals, refinement))
 
+    def renumbered(self, topology: Topology, numbers: Tensor) -> Rim:
+        """On another mesh with the same boundary, whose vertices have the ``numbers`` (V,) there; -1 inside."""
+        normals = self.normals.new_zeros(topology.num_vertices, 3)
+        old = torch.nonzero(self.track.curve_numbers >= 0).squeeze(1)
+        normals[numbers[old]] = self.normals[old]
+        return Rim(self.track.renumbered(topology, numbers), normals)
+
     def nearest(self, vertices: Tensor, *, glides: bool) -> Tensor:
         """The vertices (V, 3), those of the boundary in their places or, gliding, in the nearest on the curves."""
         track = self.track.updated(vertices) if glides else self.track
@@ -81,7 +88,8 @@ def check_rim(vertices: Tensor, topology: Topology, curves: Sequence[ClosedCurve
         extent = float(torch.linalg.vector_norm(points.amax(0) - points.amin(0)))
         samples = curve.at(curve.spaced(max(_SAMPLES, len(curve.corners))))
         there = torch.linalg.vector_norm(curve.at(track.parameters[loop]) - points, dim=1).max()
-        back = torch.cdist(samples, points).amin(1).max()
+        places, ends = samples.numpy(), points.roll(-1, 0).numpy()
+        back = segment_distances(places, places, points.numpy(), ends).min(1).max()
         away = max(float(there), float(back))
         if away > _NEAR * extent:
             raise MeshError(

@@ -102,7 +102,7 @@ class SeveralStarts(Plan):
         problem, vertices = self._problem, state["vertices"]
         grade, fault = self._grade(vertices)
         worth = problem.curvature_and_pulls(vertices)
-        if grade == _FOLDED:  # C means nothing there
+        if grade:  # C means little there
             worth += float(normal_variation(vertices, problem.topology))
         curvature = problem.length * float(total_absolute_curvature(vertices, problem.topology))
         self.found.append((name + fault, curvature))

@@ -42,7 +42,7 @@ def along_normals(
         version=object(),
         settings=_along_normals_settings(problem.settings, fraction),
         fixed={"heights": problem.topology.is_boundary_vertex | problem.fixed},
-        guard=FaceGuard(problem.topology, place),
+        guard=FaceGuard(problem.topology, place, steepest=problem.steepest(base)),
         result=lambda state: {"vertices": place(state)},
         anew=correct,  # patches may fit at other vertices than before
     )
@@ -57,7 +57,7 @@ def in_space(problem: FormProblem, vertices: Tensor, fraction: float, settings: 
         version=object(),
         settings=settings,
         fixed={"vertices": problem.fixed_in_space},
-        guard=FaceGuard(problem.topology, _places, problem.least_angle(vertices)),
+        guard=FaceGuard(problem.topology, _places, problem.least_angle(vertices), problem.steepest(vertices)),
         result=lambda state: {"vertices": state["vertices"]},
     )
 

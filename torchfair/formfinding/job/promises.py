@@ -19,6 +19,9 @@ class Promise:
         sense: ``"at most"`` or ``"at least"``.
         unit: Of both numbers, empty where there is none.
         remedy: What to change where it does not hold.
+        of_settings: What the settings ask for, where the start of a level falls short of it; None where that is the
+            bound.
+        where: Which elements do not keep it, in words; empty where they all do, or where it is not known.
         slack: Relative allowance for rounding.
     """
 
@@ -28,6 +31,8 @@ class Promise:
     sense: Literal["at most", "at least"] = "at most"
     unit: str = ""
     remedy: str = ""
+    of_settings: float | None = None
+    where: str = ""
     slack: float = 1e-6
 
     @property
@@ -40,10 +45,14 @@ class Promise:
 
     def __str__(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
-        words = f"{self.name} {self.reached:.3g}{unit}, {self.sense} {self.asked:.3g} asked for"
+        bound = f"{self.sense} {self.asked:.3g}"
+        if self.of_settings is None or self.of_settings == self.asked:
+            words = f"{self.name} {self.reached:.3g}{unit}, {bound} asked for"
+        else:
+            words = f"{self.name} {self.reached:.3g}{unit}, {bound} as at the start ({self.of_settings:.3g} asked for)"
         if self.holds:
             return words
-        return f"{words}: NOT REACHED" + (f"; {self.remedy}" if self.remedy else "")
+        return "; ".join(filter(None, (f"{words}: NOT REACHED", self.where, self.remedy)))
 
     def as_dict(self) -> dict[str, object]:
         """For reports."""
@@ -54,6 +63,8 @@ class Promise:
             "sense": self.sense,
             "unit": self.unit,
             "holds": self.holds,
+            "of_settings": self.of_settings,
+            "where": self.where,
         }
 
 

@@ -69,7 +69,7 @@ class Recipe(ABC, Generic[S]):
     def start_at(self, vertices: Tensor) -> None:
         """Starts from these places (V, 3) float64, in the unit of the input; before anything is pulled."""
         self.given, self.unit = vertices, Normalisation.of(vertices, self.topology)
-        self.start = self.unit.apply(vertices)
+        self.start = _with_unused_in_place(self.unit.apply(vertices), self.topology)
         self.pulls = Pulls(self.start)
 
     # ---- what is solved --------------------------------------------------------------------------------
@@ -178,9 +178,19 @@ class Recipe(ABC, Generic[S]):
         """The same job on a refinement of the mesh of a state."""
         raise MeshError(f"the job '{self.name}' works on one mesh and does not refine it")
 
+    def renewed(self, state: State) -> Recipe[S] | None:
+        """The same job with other faces on the surface of a state, asked for where promises are broken; None: none."""
+        return None
+
     def snapshot(self) -> Callable[[], None]:
         """A function that puts back what runs change in the job itself, beside pulls and settings."""
         return lambda: None
 
     def forget(self) -> None:
         """Forgets what may not be whole after an interruption, such as searches for closest points."""
+
+
+def _with_unused_in_place(vertices: Tensor, topology: Topology) -> Tensor:
+    """Vertices that no face uses put where one that is used stands, so that no size is measured by them."""
+    unused = topology.valences == 0
+    return torch.where(unused[:, None], vertices[topology.corners[:1]], vertices) if unused.any() else vertices

@@ -51,7 +51,8 @@ class JobResult(Generic[L]):
     """A mesh, how it was found, and whether it is what was asked for.
 
     Attributes:
-        levels: From coarse to fine; one without refinement. The first has the vertices of the input.
+        levels: From coarse to fine; one without refinement. The first has the vertices of the input, unless a
+            job was allowed to replace faces.
         notes: Decisions taken and what was missed, in words.
         stopped: Whether Ctrl-C, the callback or the time limit ended it early; the last level is the best state found,
             or was finished before.

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from torch import Tensor
 
-from ..._interrupts import deferred_interrupts
+from ..._interrupts import Interrupts, deferred_interrupts
 from ...projection import Callback
 from ..stopping import interrupted, interrupted_at_the_start
 from .recipe import Recipe
 from .result import JobResult, Level
 from .session import Session
+
+_RENEWALS = 4
 
 
 def solved(
@@ -55,9 +58,40 @@ def solved(
                 session, before, stopped = found
             recipe = session.recipe
             level = interrupts.insist(recipe.level, session.state, before, list(session.runs), like)
+            if not stopped:
+                session, level, stopped = _with_other_faces(session, level, interrupts)
+                recipe = session.recipe
             done.append(level)
             said = [*recipe.notes, *(str(promise) for promise in level.promises if not promise.holds)]
             notes += [f"level {number}: {note}" if levels else note for note in said]
             if stopped:
                 break
     return JobResult(done, notes, stopped)
+
+
+def _with_other_faces(session: Session[Any], level: Level, interrupts: Interrupts) -> tuple[Session[Any], Level, bool]:
+    """The job with other faces, as long as promises are broken and the recipe has some, and whether it was stopped.
+
+    What keeps most promises is taken, of equals the first; the runs are those of all.
+    """
+    notes, latest, tried, stopped = session.recipe.notes, session, 0, False
+    while not stopped and tried < _RENEWALS and _broken(level):
+        recipe = interrupts.insist(latest.recipe.renewed, latest.state)
+        if recipe is None:
+            break
+        latest, tried = Session(recipe, callback=session.callback, live=False), tried + 1
+        ended = interrupts.attempt(latest.solve)
+        runs = [*level.runs, *latest.runs]
+        stopped = ended is not False
+        if ended is None:
+            runs[-1] = interrupted(runs[-1])
+        other = interrupts.insist(recipe.level, latest.state, level.before, runs, level.vertices)
+        session, level = (latest, other) if _broken(other) < _broken(level) else (session, replace(level, runs=runs))
+    if tried:
+        outcome = "left as they were, others keep no more promises" if session.recipe.notes is notes else "replaced"
+        session.recipe.notes = [*notes, f"promises were broken; faces made anew {tried} time(s): {outcome}"]
+    return session, level, stopped
+
+
+def _broken(level: Level) -> int:
+    return sum(not promise.holds for promise in level.promises)

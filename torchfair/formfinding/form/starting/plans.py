@@ -15,7 +15,7 @@ _DIRECTIONS = 200  # on a half sphere
 _SPLITS = 40  # rounds in which boundary edges that are missing are halved
 _MOST = 6  # times as many vertices as at first: a plan that needs more is nearly seen from its side
 _APART = 3.0  # vertices of one rim face each other if the way along it is so many times the way across
-_ROWS = 2.5  # between two sides of the rim that face each other
+ROWS = 2.5  # between two sides of the rim that face each other
 _GRADE = 0.3  # by how much sizes grow over a unit of length
 _LEAST_SIZE = 0.1  # of the size elsewhere
 
@@ -183,7 +183,7 @@ class Sizes:
     def __init__(self, size: float, places: Floats, across: Floats) -> None:
         from scipy.spatial import cKDTree
 
-        own = np.clip(across / _ROWS, _LEAST_SIZE * size, size)
+        own = np.clip(across / ROWS, _LEAST_SIZE * size, size)
         narrow = own < size
         self.size, self._own = size, own[narrow]
         self._tree = cKDTree(places[narrow]) if narrow.any() else None

@@ -25,7 +25,7 @@ Surface = Callable[[Patch], Floats]
 
 def remeshed(
     patch: Patch, curves: Sequence[ClosedCurve], sizes: Callable[[Floats], Floats], right: Sides, surface: Surface,
-    rounds: int,
+    rounds: int, *, keeps_rim: bool = False,
 ) -> Patch:  # fmt: skip
     """Edges of the wanted length, on the boundary too, as far as the rim allows.
 
@@ -36,9 +36,10 @@ def remeshed(
         right: Never becomes False where it was True.
         surface: Puts vertices back where they belong, after every round.
         rounds: How often.
+        keeps_rim: Whether boundary edges are not split. Where all boundary vertices are corners, the boundary stays.
     """
     for _ in range(rounds):
-        patch = _split(patch, curves, sizes, right)
+        patch = _split(patch, curves, sizes, right, keeps_rim=keeps_rim)
         patch = collapsed(patch, sizes, right, _SHORT, _LONG)
         patch = _flipped(patch, right)
         patch = _evened(patch, right)
@@ -49,14 +50,17 @@ def remeshed(
 # ---- splits --------------------------------------------------------------------------------------------
 
 
-def _split(patch: Patch, curves: Sequence[ClosedCurve], sizes: Callable[[Floats], Floats], right: Sides) -> Patch:
+def _split(
+    patch: Patch, curves: Sequence[ClosedCurve], sizes: Callable[[Floats], Floats], right: Sides, *, keeps_rim: bool
+) -> Patch:
     for _ in range(_PASSES):
         edges = edges_of(patch.faces)
         p = patch.points[edges.ends]
         ratio = np.linalg.norm(p[:, 1] - p[:, 0], axis=1) / sizes(p.mean(1))
         # An inner edge between two rims is split even if it is short: its ends cannot move apart.
         bridge = ~edges.boundary & (patch.rims[edges.ends] >= 0).all(1)
-        chosen = _apart(edges, np.where(bridge, np.maximum(ratio, 1.01 * _LONG), ratio), _LONG)
+        ratio = np.where(bridge, np.maximum(ratio, 1.01 * _LONG), ratio)
+        chosen = _apart(edges, np.where(edges.boundary & keeps_rim, 0.0, ratio), _LONG)
         grown, made = _with_middles(patch, curves, edges, chosen)
         turned = ~right(grown.points, made)
         if not chosen.size:

@@ -10,16 +10,15 @@ import torch
 from ....curves import ClosedCurve
 from ....geometry import ReferenceSurface
 from ....topology import Topology
+from .counting import edge_length, with_so_many
 from .hulls import hull_between
 from .patch import Floats, Ints, Mask, Patch, face_vectors, rim_edges, rim_vertices
-from .plans import Sizes, crossing_pairs, directions_of_view, plan_axes, right_in_plan, triangulated_plan, widths
+from .plans import crossing_pairs, directions_of_view, plan_axes, right_in_plan, triangulated_plan, widths
 from .relaxing import harmonic_heights, smaller_area
-from .remeshing import Surface, remeshed
+from .remeshing import Surface
 from .stitching import least_area_band, least_area_disk
 
 _COARSE, _MOST = 64, 160  # points of a rim: to estimate the area, and to span it by dynamic programming
-_ROUNDS, _MORE_ROUNDS, _CORRECTIONS = 8, 4, 4
-_COUNT = 0.04  # relative: then the size is not corrected any more
 
 Base = Callable[[Sequence[int]], "Patch | None"]
 """Triangles between the points of rims with so many points each."""
@@ -41,10 +40,10 @@ def spanning_patches(curves: Sequence[ClosedCurve], count: int) -> Iterator[Patc
     if len(curves) == 1:
         yield from _even(curves, count, lambda counts: _disk(curves, counts), lambda _: smaller_area)
     elif len(curves) == 2:
-        yield from _even(curves, count, lambda counts: _band(curves, counts), _on)
+        yield from _even(curves, count, lambda counts: _band(curves, counts), onto)
     if len(curves) > 1:
-        yield from _even(curves, count, lambda counts: _hull(curves, counts), _on)
-        yield from _even(curves, count, lambda counts: _hull(curves, counts, seen_from_inside=True), _on)
+        yield from _even(curves, count, lambda counts: _hull(curves, counts), onto)
+        yield from _even(curves, count, lambda counts: _hull(curves, counts, seen_from_inside=True), onto)
 
 
 def _direction(curves: Sequence[ClosedCurve]) -> Floats | None:
@@ -123,20 +122,13 @@ def _even(
     patch = base(_counts(curves, max(size, length / most)))
     if patch is None:
         return
-    right: Callable[[Floats, Ints], Mask] = _anything if direction is None else right_in_plan(direction)
+    right: Callable[[Floats, Ints], Mask] = either_way if direction is None else right_in_plan(direction)
     surface = surface_of(patch)
-    across, rim, rounds = widths(patch, [curve.length for curve in curves]), patch.points, _ROUNDS
-    for _ in range(1 + _CORRECTIONS):
-        patch = remeshed(patch, curves, Sizes(size, rim, across), right, surface, rounds)
-        ratio = len(patch.points) / count
-        if abs(ratio - 1.0) < _COUNT:
-            break
-        size, rounds = size * ratio**0.5, _MORE_ROUNDS
-        across = across * max(ratio, 1.0) ** 0.5  # narrow parts have fewer rows rather than too many vertices
-    yield patch
+    across = widths(patch, [curve.length for curve in curves])
+    yield with_so_many(patch, curves, count, (size, patch.points, across), right, surface)
 
 
-def _on(base: Patch) -> Surface:
+def onto(base: Patch) -> Surface:
     """The nearest places of the base."""
     reference = ReferenceSurface(torch.from_numpy(base.points), Topology.from_faces(torch.from_numpy(base.faces)))
     return lambda patch: reference.closest(torch.from_numpy(patch.points)).positions.numpy()
@@ -146,15 +138,10 @@ def _counts(curves: Sequence[ClosedCurve], size: float) -> list[int]:
     return [max(6, 2 * len(curve.corners), round(curve.length / size)) for curve in curves]
 
 
-def _anything(points: Floats, faces: Ints) -> Mask:
+def either_way(points: Floats, faces: Ints) -> Mask:
+    """Lets triangles (F, 3) lie as they like."""
     return np.ones(len(faces), bool)
 
 
 def _area(patch: Patch) -> float:
     return float(0.5 * np.linalg.norm(face_vectors(patch.points, patch.faces), axis=1).sum())
-
-
-def edge_length(area: float, boundary: float, count: int) -> float:
-    """Of a mesh of even triangles: ``count = area / (sqrt(3)/2 length^2) + boundary / (2 length)``."""
-    density = area * 2 / np.sqrt(3)
-    return float((boundary / 2 + np.sqrt(boundary**2 / 4 + 4 * count * density)) / (2 * count))

@@ -1,0 +1,109 @@
+"""Polygons become planar wherever the mesh allows it; where it does not, that is said and nothing is made worse."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import pytest
+import torch
+from helpers import DOUBLE
+from torch import Tensor
+
+from torchfair import Topology
+from torchfair.formfinding import FairSettings, minimise_normal_variation
+from torchfair.geometry import corner_angles
+from torchfair.geometry.planarity import planarity
+
+
+def quad(warp: float) -> tuple[Tensor, Topology]:
+    """A unit square whose diagonals are ``warp`` apart."""
+    heights = 0.5 * warp * torch.tensor([-1.0, 1.0, -1.0, 1.0], dtype=DOUBLE)
+    plane = torch.tensor([[0.0, 0], [1, 0], [1, 1], [0, 1]], dtype=DOUBLE)
+    return torch.cat([plane, heights[:, None]], 1), Topology.from_faces([[0, 1, 2, 3]])
+
+
+def honeycomb(amplitude: float) -> tuple[Tensor, Topology]:
+    """Seven regular hexagons with sides of 1 on ``z = amplitude (x^2 - y^2)``."""
+    places: dict[tuple[float, float], int] = {}
+    faces = []
+    for q, r in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, -1), (-1, 1)):
+        centre = math.sqrt(3.0) * (q + 0.5 * r), 1.5 * r
+        turns = [math.radians(60.0 * k + 30.0) for k in range(6)]
+        corners = [(round(centre[0] + math.cos(t), 9), round(centre[1] + math.sin(t), 9)) for t in turns]
+        faces.append([places.setdefault(corner, len(places)) for corner in corners])
+    x, y = torch.tensor(list(places), dtype=DOUBLE).unbind(1)
+    return torch.stack([x, y, amplitude * (x**2 - y**2)], 1), Topology.from_faces(faces)
+
+
+def smallest(vertices: Tensor, topology: Topology) -> float:
+    return math.degrees(float(corner_angles(vertices, topology).min()))
+
+
+def only(measures: Mapping[str, float], name: str) -> float:
+    return float(measures[name])
+
+
+def test_one_quad_becomes_planar_beyond_the_distance_limit_and_says_so() -> None:
+    """Its corners would all stay, and are 0.07 from the plane between them."""
+    vertices, topology = quad(0.14)
+    settings = FairSettings(planar="quads", continuation=())
+    result = minimise_normal_variation(vertices, topology, settings=settings)
+    assert float(planarity(result.vertices, topology).max()) < 1e-4
+    assert result.holds
+    assert 0.05 < only(result.after, "largest_distance_relative") < 0.08
+    assert any("beyond the distance limit" in note for note in result.notes)
+    assert smallest(result.vertices, topology) > 80.0
+
+
+def test_what_cannot_become_planar_is_named_and_left_as_it_was() -> None:
+    vertices, topology = quad(0.14)
+    settings = FairSettings(planar="quads", boundary="fixed")
+    result = minimise_normal_variation(vertices, topology, settings=settings)
+    assert torch.equal(result.vertices, vertices)
+    assert not result.holds
+    (note,) = (note for note in result.notes if "NOT REACHED" in note)
+    assert "planarity of kept faces 0.139" in note
+    assert "1 of 1, counted from 0: 0 (0.14)" in note
+
+
+@pytest.mark.slow
+def test_the_distance_limit_can_be_insisted_on() -> None:
+    vertices, topology = quad(0.14)
+    result = minimise_normal_variation(vertices, topology, settings=FairSettings(planar="quads", planar_distance=0.0))
+    assert only(result.after, "largest_distance_relative") <= 0.05 * (1 + 1e-6)
+    assert not result.holds
+    assert float(planarity(result.vertices, topology).max()) <= float(planarity(vertices, topology).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("amplitude", [0.03, 0.12, -0.12])
+def test_hexagons_on_a_saddle_become_planar(amplitude: float) -> None:
+    """All but six vertices are corners of the boundary."""
+    vertices, topology = honeycomb(amplitude)
+    result = minimise_normal_variation(vertices, topology, settings=FairSettings(planar="quads"))
+    assert float(planarity(result.vertices, topology).max()) < 1e-4
+    assert result.holds
+
+
+@pytest.mark.slow
+def test_hexagons_between_fixed_vertices_are_no_worse_than_before() -> None:
+    vertices, topology = honeycomb(0.12)
+    settings = FairSettings(planar="quads", boundary="fixed")
+    result = minimise_normal_variation(vertices, topology, settings=settings)
+    assert not result.holds
+    assert float(planarity(result.vertices, topology).max()) <= float(planarity(vertices, topology).max()) * (1 + 1e-9)
+    assert result.after["normal_variation"] <= result.before["normal_variation"] * (1 + 1e-9)
+    assert any("of 7, counted from 0" in note for note in result.notes)
+
+
+def test_corners_of_faces_that_are_planar_stay() -> None:
+    """Only warped faces take corners of the boundary along."""
+    (first, topology), (second, _) = quad(0.0), quad(0.1)
+    vertices = torch.cat([first, second + torch.tensor([5.0, 0.0, 0.0], dtype=DOUBLE)])
+    both = Topology.from_faces([[0, 1, 2, 3], [4, 5, 6, 7]])
+    result = minimise_normal_variation(vertices, both, settings=FairSettings(planar="quads"))
+    assert torch.equal(result.vertices[:4], vertices[:4])
+    assert float((result.vertices - vertices)[4:].norm(dim=1).min()) > 0.01
+    assert float(planarity(result.vertices, both).max()) < 1e-4
+    assert topology.num_faces == 1

@@ -1,0 +1,78 @@
+"""How mesh files are read: options to weld and repair, what is said of a mesh, errors in the numbers of its file."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from .._names import PlacedError
+from ..errors import MeshError
+
+if TYPE_CHECKING:
+    from ..io import PolygonMesh
+
+WELD = "--weld"
+_DEFAULT = "auto"
+
+
+def add_repair(parser: argparse.ArgumentParser) -> None:
+    """The options to weld and repair what is read."""
+    add = parser.add_argument
+    add("--repair", action="store_true", help="first drop repeated corners, double faces, faces without area and "
+        "unused vertices, join T-junctions, split vertices that fans share, and orient faces consistently")  # fmt: skip
+    add(WELD, nargs="?", type=_tolerance, const=True, default=False, metavar="TOLERANCE", help="make edges of the "
+        "boundary at the same place one edge; TOLERANCE is a distance (default: 1e-6 of the extent, or rounding to "
+        "single precision)")  # fmt: skip
+    add("--split-edges", action="store_true", help="repair, and split edges of more than two faces into pairs of faces")
+
+
+def read_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What :func:`add_repair` has added, as arguments of :func:`~torchfair.io.load_mesh`."""
+    return {name: getattr(arguments, name, False) for name in ("repair", "weld", "split_edges")}
+
+
+def _tolerance(text: str) -> float | bool:
+    """A distance; the word auto for the default."""
+    if text == _DEFAULT:
+        return True
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"expected a distance of at least 0, got {text!r}")
+    return value
+
+
+def with_default_tolerance(words: Sequence[str]) -> list[str]:
+    """Arguments in which ``--weld`` without a number has its default, so that it takes no file name for one."""
+    result = []
+    for word, following in zip(words, [*words, ""][1:], strict=True):
+        result.append(f"{WELD}={_DEFAULT}" if word == WELD and not _is_number(following) else word)
+    return result
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return word == _DEFAULT
+    return True
+
+
+def said_of(mesh: PolygonMesh, name: str | None = None) -> list[str]:
+    """What is said of a mesh that was read, line by line; with the name of a file where it is not INPUT."""
+    of = "" if name is None else f"{name}: "
+    return [*(f"{of}repaired: {sentence}" for sentence in mesh.repairs), *(f"{of}note: {note}" for note in mesh.notes)]
+
+
+@contextmanager
+def in_numbers_of(mesh: PolygonMesh) -> Iterator[None]:
+    """Errors name vertices and faces as the file of the mesh does."""
+    try:
+        yield
+    except PlacedError as error:
+        raise MeshError(error.sentence.told(mesh.names)) from None

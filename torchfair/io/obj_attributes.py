@@ -1,0 +1,166 @@
+"""What an OBJ file says of faces beside their vertices: groups, materials, smoothing, texture coordinates, colours."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from .._ranges import ranges
+from ..errors import MeshFileError
+from .raw_mesh import Ints, RawMesh
+from .text import Words, to_floats, to_ints
+
+KEPT = (b"g", b"o", b"s", b"usemtl", b"mtllib")
+_IN_WORDS = {b"g": "groups", b"o": "object names", b"s": "smoothing groups", b"usemtl": "materials",
+    b"mtllib": "material files", b"vn": "normals", b"vt": "texture coordinates", b"l": "line elements",
+    b"p": "points"}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ObjAttributes:
+    """Lines of an OBJ file that go with its faces and vertices, as they are written back.
+
+    Attributes:
+        folder: Of the file; material files are found from there.
+        statements: Groups, objects, smoothing and materials, with the face before which each of them stands.
+        behind: Words behind the coordinates of each vertex, such as colours; empty if there are none.
+        textures: Lines of texture coordinates.
+        corner_textures: (H,) texture coordinates of each corner, -1 for none.
+        dropped: How often there were other statements, by keyword; these are not written.
+    """
+
+    folder: Path
+    statements: tuple[tuple[int, bytes], ...] = ()
+    behind: tuple[bytes, ...] = ()
+    textures: tuple[bytes, ...] = ()
+    corner_textures: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    dropped: Mapping[bytes, int] = field(default_factory=dict)
+
+    def of_repaired(self, vertices: Ints, faces: Ints, corners: Ints) -> ObjAttributes:
+        """The same for what is left: old numbers of vertices, faces, and corners (-1 for new ones)."""
+        places = np.array([place for place, _ in self.statements], np.int64)
+        moved = np.searchsorted(faces, places).tolist()
+        textures = self.corner_textures
+        return replace(
+            self,
+            statements=tuple(zip(moved, (line for _, line in self.statements), strict=True)),
+            behind=tuple(self.behind[v] for v in vertices.tolist()) if self.behind else (),
+            corner_textures=np.where(corners < 0, -1, textures[corners]) if textures.size else textures,
+        )
+
+    def left_out(self, suffix: str, same_faces: bool, marks: bool = False) -> str:
+        """What a mesh file with that extension will not hold, in words.
+
+        Args:
+            suffix: The extension.
+            same_faces: Whether it has the same faces.
+            marks: Whether line elements are carried on.
+        """
+        names = [name(keyword) for keyword in self.dropped if not (marks and keyword == b"l")]
+        if suffix != ".obj" or not same_faces:
+            kept = dict.fromkeys(line.split()[0] for _, line in self.statements)
+            names = [*map(name, kept), *names]
+            names += ["texture coordinates"] if self.textures else []
+            names += ["numbers behind vertices, such as colours"] if self.behind else []
+        return ", ".join(names)
+
+
+def name(keyword: bytes) -> str:
+    """What a statement holds, in words."""
+    word = keyword.decode("ascii", "replace")
+    return f"{_IN_WORDS[keyword]} ({word})" if keyword in _IN_WORDS else f"statements {word}"
+
+
+def read_attributes(
+    path: Path, text: Words, keywords: list[bytes], rows: tuple[Ints, Ints], words: list[bytes]
+) -> ObjAttributes:
+    """The attributes of a file.
+
+    Args:
+        path: The file.
+        text: Its words.
+        keywords: First word of every line.
+        rows: Lines of the vertices and of the faces.
+        words: Corners as they stand in the file.
+    """
+    vertex_rows, face_rows = rows
+    counts = Counter(keywords)
+    dropped = {k: counts[k] for k in sorted(counts) if k not in (*KEPT, b"v", b"f", b"fo", b"vt")}
+    kept = [row for row, keyword in enumerate(keywords) if keyword in KEPT] if counts.keys() & set(KEPT) else []
+    places = np.searchsorted(face_rows, kept).tolist()
+    texture_rows = (
+        np.flatnonzero(np.array([keyword == b"vt" for keyword in keywords])) if counts[b"vt"] else vertex_rows[:0]
+    )
+    numbers = _corner_textures(path, text, face_rows, texture_rows, words) if texture_rows.size else vertex_rows[:0]
+    more = text.sizes[vertex_rows] > 4
+    return ObjAttributes(
+        path.parent,
+        tuple(zip(places, (_line(text, row) for row in kept), strict=True)),
+        tuple(_line(text, row, 4) for row in vertex_rows.tolist()) if more.any() else (),
+        tuple(_line(text, row) for row in texture_rows.tolist()) if (numbers >= 0).any() else (),
+        numbers if (numbers >= 0).any() else vertex_rows[:0],
+        dropped,
+    )
+
+
+def _line(text: Words, row: int, first: int = 0) -> bytes:
+    return b" ".join(text.words[text.starts[row] + first : text.starts[row + 1]])
+
+
+def _corner_textures(path: Path, text: Words, face_rows: Ints, texture_rows: Ints, words: list[bytes]) -> Ints:
+    """(H,) number from zero of the texture coordinates of each corner, -1 without."""
+    to_floats(path, text, ranges(text.starts[texture_rows] + 1, text.sizes[texture_rows] - 1))
+    parts = [word.split(b"/")[1] if b"/" in word else b"" for word in words]
+    has = np.array([bool(part) for part in parts], np.bool_)
+    sizes = text.sizes[face_rows] - 1
+    owners = np.repeat(face_rows, sizes)[has]
+    given = to_ints(path, Words([part for part in parts if part], np.arange(has.sum() + 1), text.lines[owners]),
+        np.arange(has.sum()))  # fmt: skip
+    known = np.searchsorted(texture_rows, owners)
+    numbers = np.where(given < 0, known + given, given - 1)
+    wrong = np.flatnonzero((numbers < 0) | (numbers >= len(texture_rows)))
+    if wrong.size:
+        fault = f"a corner names texture coordinates {given[wrong[0]]}, but there are {len(texture_rows)}"
+        raise MeshFileError(path, fault, int(text.lines[owners[wrong[0]]]))
+    result = np.full(len(words), -1)
+    result[has] = numbers
+    return result
+
+
+def face_statements(mesh: RawMesh, attributes: ObjAttributes, folder: Path) -> str:
+    """Faces with their texture coordinates, and the statements between them."""
+    corners = list(map(str, (mesh.corners + 1).tolist()))
+    textures = attributes.corner_textures
+    if textures.size:
+        sizes = np.diff(mesh.offsets)
+        whole = np.repeat(np.minimum.reduceat(textures, mesh.offsets[:-1]) >= 0, sizes)
+        behind = np.where(whole, textures + 1, 0).tolist()
+        corners = [
+            f"{corner}/{texture}" if texture else corner for corner, texture in zip(corners, behind, strict=True)
+        ]
+    offsets = mesh.offsets.tolist()
+    faces = [f"f {' '.join(corners[a:b])}\n" for a, b in itertools.pairwise(offsets)]
+    pieces, done = [], 0
+    for place, line in attributes.statements:
+        pieces += faces[done:place]
+        pieces.append(_statement(line, attributes.folder, folder))
+        done = max(done, place)
+    return "".join([*pieces, *faces[done:]])
+
+
+def _statement(line: bytes, source: Path, folder: Path) -> str:
+    """A statement as text; a material file is found from the folder of the new file."""
+    text = line.decode("utf-8", "surrogateescape")
+    if text.startswith("mtllib "):
+        file = source / text.removeprefix("mtllib ")
+        if not Path(text.removeprefix("mtllib ")).is_absolute() and file.is_file():
+            with contextlib.suppress(ValueError):  # another drive
+                text = f"mtllib {Path(os.path.relpath(file, folder)).as_posix()}"
+    return text + "\n"

@@ -1,0 +1,195 @@
+"""Rhino's 3DM files, by the package rhino3dm: meshes in double precision, with unit, layers and names.
+
+The package gives no access to the table of n-gons of a mesh: faces of more than four corners are written as triangles,
+with a user text ``torchfair ngons`` that says which of them belong together, and are read back from it.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from ..errors import MeshFileError, TorchfairError
+from ..topology import Topology
+from ..triangulation import triangulate
+from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
+from .rhino_parts import UNITLESS, RhinoParts
+
+_NGONS = "torchfair ngons"
+_VERSION = 7
+_MOST_NESTED = 32  # blocks in blocks
+
+
+def rhino_package() -> Any:
+    """The package rhino3dm.
+
+    Raises:
+        TorchfairError: it is not installed.
+    """
+    try:
+        import rhino3dm
+    except ImportError:
+        raise TorchfairError("3DM files need rhino3dm: pip install 'torchfair[rhino]'. Or save as OBJ") from None
+    return rhino3dm
+
+
+def read_rhino(path: Path, data: bytes) -> RawMesh:
+    """All visible meshes of a 3DM file in one, blocks where they are inserted.
+
+    Raises:
+        MeshFileError: it cannot be read, or has no mesh.
+        TorchfairError: rhino3dm is not installed.
+    """
+    rhino = rhino_package()
+    model = rhino.File3dm.Read(str(path))
+    if model is None:
+        raise MeshFileError(path, "is no 3DM file that can be read")
+    points: list[Floats] = []
+    faces: list[list[int]] = []
+    objects: list[tuple[str, str]] = []
+    owners: list[int] = []
+    others: Counter[str] = Counter()
+    count = 0
+    for item, place in _items(rhino, model):
+        mesh = item.Geometry
+        if not isinstance(mesh, rhino.Mesh):
+            others[type(mesh).__name__] += 1
+            continue
+        own = _points(mesh) @ place[:3, :3].T + place[:3, 3]
+        found = _faces(mesh, item.Attributes.GetUserString(_NGONS))
+        turned = np.linalg.det(place[:3, :3]) < 0.0  # a mirrored block
+        faces += [[v + count for v in (face[::-1] if turned else face)] for face in found]
+        owners += [len(objects)] * len(found)
+        layer = model.Layers[item.Attributes.LayerIndex].FullPath if len(model.Layers) else ""
+        objects.append((item.Attributes.Name or "", layer or ""))
+        points.append(own)
+        count += len(own)
+    if not points:
+        raise MeshFileError(path, f"has no visible meshes{_listed(others)}. Mesh its surfaces in Rhino first")
+    sizes = np.array([len(face) for face in faces], np.int64)
+    corners = np.array([v for face in faces for v in face], np.int64)
+    raw = assemble(Origin(path), np.concatenate(points), corners, sizes)
+    parts = RhinoParts(model.Settings.ModelUnitSystem.name, tuple(objects), np.array(owners, np.int64))
+    notes = [f"left out of the file{_listed(others)}"] if others else []
+    return raw._replace(attributes=parts, notes=tuple(notes))
+
+
+def write_rhino(mesh: RawMesh, parts: RhinoParts | None = None) -> bytes:
+    """The bytes of a 3DM file, in double precision.
+
+    Raises:
+        TorchfairError: rhino3dm is not installed, or refuses to write.
+    """
+    rhino = rhino_package()
+    parts = parts or RhinoParts(UNITLESS, (("", ""),), np.zeros(len(mesh.offsets) - 1, np.int64))
+    model = rhino.File3dm()
+    model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, parts.unit)
+    layers: dict[str, int] = {}
+    for number, (name, layer) in enumerate(parts.objects):
+        chosen = np.flatnonzero(parts.owners == number)
+        if not chosen.size:
+            continue
+        made, table = _made(rhino, mesh, chosen)
+        attributes = rhino.ObjectAttributes()
+        attributes.Name = name
+        if layer:
+            attributes.LayerIndex = _layer(rhino, model, layer, layers)
+        if table:
+            attributes.SetUserString(_NGONS, json.dumps(table))
+        model.Objects.AddMesh(made, attributes)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "mesh.3dm"
+        if not model.Write(str(file), _VERSION):
+            raise TorchfairError("rhino3dm cannot write this mesh. Write OBJ, OFF or PLY")
+        return file.read_bytes()
+
+
+def _items(rhino: Any, model: Any) -> Iterator[tuple[Any, Floats]]:
+    """Visible objects, with the maps (4, 4) that put them into place."""
+    definitions = {str(block.Id): [str(i) for i in block.GetObjectIds()] for block in model.InstanceDefinitions}
+    by_id = {str(item.Attributes.Id): item for item in model.Objects}
+
+    def walk(item: Any, place: Floats, depth: int) -> Iterator[tuple[Any, Floats]]:
+        if not item.Attributes.Visible or depth > _MOST_NESTED:
+            return
+        if not isinstance(item.Geometry, rhino.InstanceReference):
+            yield item, place
+            return
+        inner = place @ _matrix(item.Geometry.Xform)
+        for part in definitions.get(str(item.Geometry.ParentIdefId), ()):
+            if part in by_id:
+                yield from walk(by_id[part], inner, depth + 1)
+
+    for item in model.Objects:
+        if not item.Attributes.IsInstanceDefinitionObject:
+            yield from walk(item, np.eye(4), 0)
+
+
+def _matrix(transform: Any) -> Floats:
+    return np.array([[getattr(transform, f"M{i}{j}") for j in range(4)] for i in range(4)])
+
+
+def _points(mesh: Any) -> Floats:
+    places = mesh.Vertices.ToPoint3dArray()
+    return np.array([(place.X, place.Y, place.Z) for place in places], np.float64).reshape(-1, 3)
+
+
+def _faces(mesh: Any, table: str | None) -> list[list[int]]:
+    """Faces of a mesh, with the triangles of n-gons put together again, as far as they are still there."""
+    faces = [list(dict.fromkeys(mesh.Faces[i])) for i in range(mesh.Faces.Count)]
+    try:
+        ngons = json.loads(table) if table else []
+        for first, corners in reversed(ngons):
+            triangles = faces[first : first + len(corners) - 2]
+            if {v for face in triangles for v in face} == set(corners) and all(len(face) == 3 for face in triangles):
+                faces[first : first + len(corners) - 2] = [corners]
+    except (ValueError, TypeError):  # a text that somebody has changed
+        return faces
+    return faces
+
+
+def _made(rhino: Any, mesh: RawMesh, chosen: Ints) -> tuple[Any, list[tuple[int, list[int]]]]:
+    """A mesh of some faces, and its n-gons: the first triangle of each, and its corners."""
+    faces = [mesh.corners[mesh.offsets[f] : mesh.offsets[f + 1]] for f in chosen.tolist()]
+    whole = len(chosen) == len(mesh.offsets) - 1
+    used = np.arange(len(mesh.points)) if whole else np.unique(np.concatenate(faces))
+    made = rhino.Mesh()
+    made.Vertices.UseDoublePrecisionVertices = True
+    for number, place in enumerate(mesh.points[used].tolist()):
+        made.Vertices.Add(*place)
+        made.Vertices.SetPoint3dAt(number, rhino.Point3d(*place))  # adding alone is in single precision
+    table: list[tuple[int, list[int]]] = []
+    for face in faces:
+        corners = np.searchsorted(used, face)
+        if len(face) <= 4:
+            made.Faces.AddFace(*corners.tolist())
+            continue
+        table.append((made.Faces.Count, corners.tolist()))
+        alone = torch.from_numpy(mesh.points[face])
+        for triangle in triangulate(alone, Topology.from_faces([list(range(len(face)))])).triangles.tolist():
+            made.Faces.AddFace(*corners[triangle].tolist())
+    made.Normals.ComputeNormals()
+    return made, table
+
+
+def _layer(rhino: Any, model: Any, path: str, known: dict[str, int]) -> int:
+    """Number of a layer such as Roof::Glass, which is made where it is not there."""
+    if path not in known:
+        above, _, name = path.rpartition("::")
+        layer = rhino.Layer()
+        layer.Name = name
+        if above:
+            layer.ParentLayerId = model.Layers[_layer(rhino, model, above, known)].Id
+        known[path] = model.Layers.Add(layer)
+    return known[path]
+
+
+def _listed(others: Counter[str]) -> str:
+    return ": " + ", ".join(f"{count} {name}" for name, count in sorted(others.items())) if others else ""

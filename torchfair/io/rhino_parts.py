@@ -1,0 +1,41 @@
+"""Which faces of a 3DM file are of which object, as it is written back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .raw_mesh import Ints
+
+UNITLESS = "None"
+
+
+@dataclass(frozen=True, eq=False)
+class RhinoParts:
+    """Objects of a 3DM file.
+
+    Attributes:
+        unit: Unit of length, by its name in Rhino, such as Millimeters.
+        objects: Name and layer (Roof::Glass) of each object.
+        owners: (F,) object of each face.
+    """
+
+    unit: str
+    objects: tuple[tuple[str, str], ...]
+    owners: Ints
+
+    def of_repaired(self, vertices: Ints, faces: Ints, corners: Ints) -> RhinoParts:
+        """The same for what is left: old numbers of vertices, faces, and corners."""
+        return replace(self, owners=self.owners[faces])
+
+    def of_other_faces(self, count: int) -> RhinoParts:
+        """The same unit for a mesh of so many other faces, one object with the name and layer of the first one."""
+        return replace(self, objects=self.objects[:1], owners=np.zeros(count, np.int64))
+
+    def left_out(self, suffix: str, same_faces: bool, marks: bool = False) -> str:
+        """What a mesh file with that extension will not hold, in words; see ``ObjAttributes``."""
+        if suffix != ".3dm":
+            named = any(name or layer for name, layer in self.objects)
+            return f"the unit ({self.unit})" + (" and names and layers of objects" if named else "")
+        return "" if same_faces or len(self.objects) == 1 else "the single objects"
