@@ -7,6 +7,12 @@ import torch
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair.fields import FaceFrames, direction_field, directions_of, matchings, merge_singularities, vertex_charges
+from torchfair.meshing.boundary_runs import find_runs
+from torchfair.meshing.cut_graph import CutGraph, cut_open
+from torchfair.meshing.integers import split_integers
+from torchfair.meshing.seamless_map import MapProblem
+from torchfair.meshing.seams import find_seams
 from torchfair.shapes import Surface, irregular_triangles
 
 
@@ -66,3 +72,23 @@ def side_by_side(*meshes: tuple[Tensor, Topology]) -> tuple[Tensor, Topology]:
 def nearest(vertices: Tensor, *places: tuple[float, float]) -> list[int]:
     """Numbers of the vertices nearest to points of the plane z = 0."""
     return [int((vertices[:, :2] - torch.tensor(place)).norm(dim=1).argmin()) for place in places]
+
+
+def cut(vertices: Tensor, topology: Topology, smoothing: float = 0.05) -> tuple[FaceFrames, CutGraph]:
+    """A mesh cut open with its field of crosses."""
+    frames = FaceFrames.of(vertices, topology)
+    directions = directions_of(frames)
+    angles = direction_field(frames, directions, smoothing, 4)
+    matched = matchings(frames, angles)
+    angles, matched = merge_singularities(frames, angles, matched, directions, smoothing, 0.2)
+    return frames, cut_open(frames, angles, matched, vertex_charges(frames, angles, matched))
+
+
+def problem_of(frames: FaceFrames, graph: CutGraph, spacing: float, align: bool = False) -> tuple[MapProblem, list]:
+    """The problem of a map with squares, and its boundary runs."""
+    seams = find_seams(frames, graph)
+    runs = find_runs(frames, graph, np.radians(12), 1.5 * spacing) if align else []
+    count = len(frames.triangles)
+    split = split_integers(frames, graph, seams, runs)
+    density, stiff = np.full((count, 2), 1 / spacing), np.full(count, 30.0)
+    return MapProblem(frames, graph, seams, split, np.eye(2), density, stiff), runs

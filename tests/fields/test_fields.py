@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from helpers import random_rotation, wavy_grid
-from meshing_tools import MonkeySaddle, ellipsoid, irregular, punched
+from meshing_tools import Flat, MonkeySaddle, ellipsoid, irregular, nearest, punched
 from torch import Tensor
 
 from torchfair import MeshError, Topology
@@ -191,6 +191,29 @@ def test_singular_vertices_of_a_monkey_saddle_are_merged() -> None:
     assert np.abs(frames.points[after != 0][:, :2]).max() < 0.2
     turning = differences(frames, angles) - QUARTER * matched
     assert np.abs(turning).max() < QUARTER  # angles have followed the matchings
+
+
+@pytest.mark.parametrize(("symmetry", "charge"), [(2, 2), (4, 1)])
+def test_where_no_three_faces_would_meet_singular_vertices_are_split(symmetry: Symmetry, charge: int) -> None:
+    """Around a pole directions turn once: a whole index. Fewer than three triangles, or quads, would meet there."""
+    vertices, topology = irregular(Flat(), 600)
+    frames = FaceFrames.of(vertices, topology)
+    pole = nearest(vertices, (0.05, -0.02))[0]
+    away = frames.centres - frames.points[pole]
+    angles = np.arctan2((away * frames.second).sum(1), (away * frames.first).sum(1))
+    matched = matchings(frames, angles, 2)
+    charges = vertex_charges(frames, angles, matched)
+    assert charges[pole] == 4 == np.abs(charges).sum()
+    none = np.zeros(len(frames.triangles))
+    directions = Directions(np.zeros((len(none), 3), complex), none, none)
+    angles, matched = merge_singularities(frames, angles, matched, directions, 0.05, 0.3, symmetry)
+    charges = vertex_charges(frames, angles, matched)
+    singular = np.flatnonzero(charges)
+    assert (charges[singular] == charge).all()
+    assert charges.sum() == 4
+    places = frames.points[singular]
+    apart = np.linalg.norm(places[:, None] - places, axis=-1) + np.eye(len(places))
+    assert apart.min() > 0.2
 
 
 def test_opposite_singular_vertices_cancel() -> None:

@@ -8,45 +8,24 @@ import numpy as np
 import pytest
 import torch
 from helpers import DOUBLE
-from meshing_tools import Flat, MonkeySaddle, ellipsoid, irregular, nearest, punched
-from torch import Tensor
+from meshing_tools import Flat, MonkeySaddle, cut, ellipsoid, irregular, nearest, problem_of, punched
 
 from torchfair import Topology
 from torchfair.boundary import boundary_corners
-from torchfair.fields import FaceFrames, direction_field, directions_of, matchings, merge_singularities, vertex_charges
+from torchfair.fields import FaceFrames
 from torchfair.meshing.boundary_runs import find_runs
 from torchfair.meshing.chords import find_chords, find_lattice_points
 from torchfair.meshing.crease_runs import CreaseLines
 from torchfair.meshing.creases import find_creases
 from torchfair.meshing.crossings import find_crossings
-from torchfair.meshing.cut_graph import CutGraph, cut_open
-from torchfair.meshing.integers import split_integers
 from torchfair.meshing.off_lines import off_the_lines
-from torchfair.meshing.seamless_map import MapProblem, SeamlessMap
+from torchfair.meshing.seamless_map import SeamlessMap
 from torchfair.meshing.seams import ROTATIONS, find_seams
 from torchfair.meshing.tracing import Cells, trace_cells
 from torchfair.meshing.untangling import untangled
 from torchfair.shapes import Cylinder, PrincipalParaboloid, Torus, icosphere
 
 SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
-
-
-def cut(vertices: Tensor, topology: Topology, smoothing: float = 0.05) -> tuple[FaceFrames, CutGraph]:
-    frames = FaceFrames.of(vertices, topology)
-    directions = directions_of(frames)
-    angles = direction_field(frames, directions, smoothing, 4)
-    matched = matchings(frames, angles)
-    angles, matched = merge_singularities(frames, angles, matched, directions, smoothing, 0.2)
-    return frames, cut_open(frames, angles, matched, vertex_charges(frames, angles, matched))
-
-
-def problem_of(frames: FaceFrames, graph: CutGraph, spacing: float, align: bool = False) -> tuple[MapProblem, list]:
-    seams = find_seams(frames, graph)
-    runs = find_runs(frames, graph, np.radians(12), 1.5 * spacing) if align else []
-    count = len(frames.triangles)
-    split = split_integers(frames, graph, seams, runs)
-    density, stiff = np.full((count, 2), 1 / spacing), np.full(count, 30.0)
-    return MapProblem(frames, graph, seams, split, np.eye(2), density, stiff), runs
 
 
 def uncreased(frames: FaceFrames) -> CreaseLines:

@@ -151,6 +151,7 @@ def test_the_mesh_does_not_depend_on_motion_scale_and_numbering() -> None:
     faces = order.argsort()[topology.triangles].roll(1, 1).flip(0)
     again = principal_quads(vertices[order], Topology.from_faces(faces), count=300)
     assert again.report["faces"] == found.report["faces"]
+    assert torch.cdist(found.vertices, again.vertices).amin(1).max() < 1e-4
     assert torch.cdist(found.singular_points, again.singular_points).amin(1).max() < 0.1 * found.report["spacing"]
 
 

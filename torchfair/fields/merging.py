@@ -106,7 +106,7 @@ def _split(
     most = _MOST_POSITIVE[symmetry]
     for vertex in np.flatnonzero(charges > most).tolist():
         graph = _inner_edges(frames)
-        distance, before = dijkstra(graph, indices=vertex, limit=2 * radius, return_predecessors=True)
+        distance, before = dijkstra(graph, True, np.array(vertex), True, limit=2 * radius)
         near = np.flatnonzero(np.isfinite(distance) & (distance <= radius) & (charges == 0))
         steps: list[tuple[int, int, int]] = []
         taken: list[int] = []

@@ -58,7 +58,7 @@ def _collapse_short(edits: PolygonEdits, shortest: Floats) -> int:
 def _join_small(edits: PolygonEdits, smallest: Floats) -> int:
     """Joins faces at curves below an area with the neighbour across their longest side, or collapses their shortest."""
     done = 0
-    for number in edits.curve_faces():
+    for number in sorted(edits.curve_faces(), key=edits.area):
         if number not in edits.faces or edits.area(number) >= smallest[edits.faces[number]].min():
             continue
         sides = sorted(edits.sides(number), key=edits.length)

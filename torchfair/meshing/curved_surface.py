@@ -42,7 +42,8 @@ def on_curved_surface(points: Tensor, vertices: Tensor, topology: Topology, ring
     moves = (weights[..., None] * above[..., None] * normals).sum(1)
     sides = (vertices[corners] - vertices[corners.roll(1, 1)]).norm(dim=-1).amax(1)
     most = _MOST * sides / moves.norm(dim=1).clamp_min(1e-300)
-    return points + moves * most.clamp_max(1.0)[:, None]
+    moved: Tensor = points + moves * most.clamp_max(1.0)[:, None]
+    return moved
 
 
 def _straight(vertices: Tensor, topology: Topology, normals: Tensor) -> Tensor:

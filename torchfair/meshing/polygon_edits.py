@@ -106,8 +106,10 @@ class PolygonEdits:
             changed[number] = face if len(face) >= 3 else []
         return self._allowed(changed) and self._apply(changed, goes, stays)
 
-    def _rank(self, node: int) -> tuple[bool, bool, int]:
-        return bool(self.fixed[node]), bool(self.on_curve[node]), len(self.around[node])
+    def _rank(self, node: int) -> tuple[bool, bool, int, float]:
+        """Of two nodes the higher one stays; the last is by geometry, so that numbers do not decide."""
+        around = self.around[node]
+        return bool(self.fixed[node]), bool(self.on_curve[node]), len(around), sum(sorted(map(self.area, around)))
 
     def merge(self, number: int, edge: Edge) -> bool:
         """Makes one face of a face and its neighbour across an edge; see :meth:`collapse`."""

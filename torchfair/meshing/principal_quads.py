@@ -27,9 +27,10 @@ def principal_quads(
 ) -> QuadMesh:
     """A quad mesh of a surface whose edges follow its principal curvature lines.
 
-    Its vertices lie on a smooth surface through those given. Inside all faces are quads, which meet in fours but for the singular points of the
-    principal directions; at the boundary cells are clipped to polygons. Euler number, boundary loops, components and
-    orientation are those of the surface. Components are meshed one by one with the same spacing.
+    Its vertices lie on a smooth surface through those given. Inside all faces are quads, which meet in fours but for
+    the singular points of the principal directions; at the boundary cells are clipped to polygons. Euler number,
+    boundary loops, components and orientation are those of the surface. Components are meshed one by one with the same
+    spacing.
 
     Quads along principal directions are nearly planar, and have the least E of all: that of edges across an absolute
     curvature is its integral, so that E is the total absolute curvature C (section 4 of the paper).

@@ -31,9 +31,9 @@ def principal_triangles(
 ) -> TriangleMesh:
     r"""A lattice of triangles of which one edge in three follows principal curvature lines.
 
-    Its vertices lie on a smooth surface through those given, in rows along principal curvature lines, each shifted by half an edge against the
-    next; inside all have valence 6 but for singular points of index 1/2 (valence 3) and -1/2 (valence 9). It is what
-    :func:`torchfair.formfinding.principal_symmetric` starts from.
+    Its vertices lie on a smooth surface through those given, in rows along principal curvature lines, each shifted by
+    half an edge against the next; inside all have valence 6 but for singular points of index 1/2 (valence 3) and -1/2
+    (valence 9). It is what :func:`torchfair.formfinding.principal_symmetric` starts from.
 
     Rows follow the principal curvature a that is smaller where K is negative. There triangles with edges 2p along rows
     that are q apart have E per area ``|a| + |b| + 2 |a| p^2 / q^2``, so rows are laid farther apart than those of

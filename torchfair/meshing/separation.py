@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
@@ -26,7 +28,7 @@ def gaps(frames: FaceFrames, graph: CutGraph, seams: Seams, radius: float) -> sp
     singular = np.flatnonzero(graph.charges)
     at = [np.flatnonzero((frames.triangles == vertex).any(1)) for vertex in singular]
     if len(singular) < 2:
-        return sp.csr_matrix((0, len(seams.vertex)), dtype=complex)
+        return sp.csr_matrix(np.zeros((0, len(seams.vertex)), complex))
     starts = np.array([faces[0] for faces in at])
     distance, before = dijkstra(dual_graph(frames), indices=starts, limit=radius, return_predecessors=True)
     rows: list[dict[int, complex]] = []
@@ -58,7 +60,7 @@ def _gap(
             terms[copy] = terms.get(copy, 0) + sign * back
 
     here = start
-    for face, other in zip(path, path[1:], strict=False):
+    for face, other in itertools.pairwise(path):
         shared = np.intersect1d(
             frames.topology.corner_edges.numpy()[3 * face : 3 * face + 3],
             frames.topology.corner_edges.numpy()[3 * other : 3 * other + 3],
@@ -82,7 +84,8 @@ def separate_vectors(metric: Floats, target: Floats, rows: Floats, offsets: Floa
     Args:
         metric: (k, k) positive definite, of eigenvalues up to 1.
         target: (k,).
-        rows: (2n, k), and ``offsets`` (2n,): both coordinates of each gap are ``rows @ y + offsets``.
+        rows: (2n, k) of both coordinates of every gap by whole vectors.
+        offsets: (2n,) what is added to them.
     """
     vectors = closest_vectors(metric, target).vectors
     wanted = (rows @ target + offsets).reshape(-1, 2)
@@ -99,7 +102,8 @@ def separate_vectors(metric: Floats, target: Floats, rows: Floats, offsets: Floa
             stiff = stiff + _WEIGHT * np.outer(row, row)
             right = right + _WEIGHT * row * (ahead - offsets[2 * pair + part])
         done |= new
-        vectors = closest_vectors(stiff, np.linalg.lstsq(stiff, right)[0]).vectors
+        centre = np.asarray(np.linalg.lstsq(stiff, right)[0], np.float64)
+        vectors = closest_vectors(stiff, centre).vectors
     apart = np.array([not _together(rows, offsets, vector).any() for vector in vectors])
     return vectors[apart] if apart.any() else vectors
 

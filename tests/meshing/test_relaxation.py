@@ -1,0 +1,87 @@
+"""Lengths that follow the field, and singular points that are not rounded to one place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from meshing_tools import Flat, cut, ellipsoid, irregular, problem_of
+
+from torchfair.fields import FaceFrames, matchings
+from torchfair.fields.frames import Floats
+from torchfair.meshing import MeshingSettings
+from torchfair.meshing.components import read_surface
+from torchfair.meshing.cut_graph import CutGraph, cut_open
+from torchfair.meshing.ladder import mesh_component
+from torchfair.meshing.lattice import SQUARES
+from torchfair.meshing.relaxation import loosened, stretched
+from torchfair.meshing.separation import gaps, separate_vectors
+from torchfair.shapes import Torus
+
+
+def off_the_field(jacobians: Floats) -> float:
+    """Mean angle of both gradients to the directions."""
+    a, b, c, d = jacobians
+    return float((np.abs(np.arctan2(b, a)) + np.abs(np.arctan2(c, d))).mean())
+
+
+def fan() -> tuple[FaceFrames, CutGraph]:
+    """A square in the plane with lines away from a point outside, and circles around it."""
+    frames = FaceFrames.of(*irregular(Flat(), 500))
+    away = frames.centres - np.array([2.0, 0, 0])
+    angles = np.arctan2((away * frames.second).sum(1), (away * frames.first).sum(1))
+    return frames, cut_open(frames, angles, matchings(frames, angles), np.zeros(len(frames.points), np.int64))
+
+
+def test_lines_that_diverge_keep_their_directions_where_lengths_may_follow() -> None:
+    frames, graph = fan()
+    problem = problem_of(frames, graph, 0.3)[0]
+    after = stretched(problem)
+    assert off_the_field(after.real_jacobians) < 0.85 * off_the_field(problem.real_jacobians)
+    radii = np.linalg.norm(frames.centres - np.array([2.0, 0, 0]), axis=1)
+    circles = np.log(after.density[:, 1] * 0.3)
+    assert np.corrcoef(circles, -np.log(radii))[0, 1] > 0.9  # as many lines on every circle
+    assert -1.1 < np.polyfit(np.log(radii), circles, 1)[0] < -0.5
+    twice = stretched(replace(problem, density=2 * problem.density))
+    assert np.allclose(twice.density, 2 * after.density, rtol=1e-8)  # in proportion to what is wanted
+
+
+def test_directions_weigh_less_only_around_triangles_that_are_turned_over() -> None:
+    frames, graph = fan()
+    sound = problem_of(frames, graph, 0.3)[0]
+    assert loosened(sound, sound.density) is sound
+    distance = np.linalg.norm(frames.centres, axis=1)
+    signs = np.where((distance < 0.2)[:, None], [-1.0, 1.0], 1.0)
+    weights = loosened(replace(sound, density=signs * sound.density), sound.density).anisotropy
+    assert (weights[distance < 0.2] == 6).all()  # once: then densities are those that come out
+    assert (weights[distance > 0.8] == 30).all()
+
+
+def test_gaps_are_whole_whatever_cuts_lie_between() -> None:
+    frames, graph = cut(*ellipsoid(3))
+    problem = problem_of(frames, graph, 0.15)[0]
+    found = problem.candidates()[0]
+    between = gaps(frames, graph, problem.seams, 10.0) @ found.values
+    assert len(between) == 8 * 7 / 2
+    assert np.allclose(between, np.rint(between.real) + 1j * np.rint(between.imag), atol=1e-8)
+    assert (np.abs(between) > 0.5).all()
+    assert gaps(frames, graph, problem.seams, 0.3).shape[0] < len(between)
+
+
+def test_vectors_that_let_singular_points_coincide_are_avoided() -> None:
+    metric, target = np.diag([1.0, 0.9, 0.8]), np.array([0.3, -0.1, 2.1])
+    rows = np.array([[1.0, 0, 0], [0, 1, 0]])
+    vectors = separate_vectors(metric, target, rows, np.zeros(2))
+    assert vectors[0].tolist() == [1, 0, 2]
+    assert (vectors[:, :2] != 0).any(1).all()
+    assert separate_vectors(metric, target, rows[:0], np.zeros(0))[0].tolist() == [0, 0, 2]
+    assert separate_vectors(metric, target, rows, np.array([0.0, 1.0]))[0].tolist() == [0, 0, 2]
+
+
+def test_a_search_can_begin_with_a_later_plan() -> None:
+    surface = read_surface(*irregular(Torus(), 600), MeshingSettings())
+    given = surface.parts[0], surface.fields[0], SQUARES, 0.5, 0.25, MeshingSettings()
+    _, words, plan = mesh_component(*given)
+    assert (words, plan) == ("", 0)
+    _, words, plan = mesh_component(*given, first=1)
+    assert (words, plan) == ("boundary not aligned", 1)
