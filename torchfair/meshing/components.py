@@ -15,6 +15,7 @@ from .._numbers import check_count, check_number
 from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
+from ..geometry import fitted_curvature
 from ..topology import Topology
 from .attempt import PieceMesh
 from .curvature_sizes import CurvatureSizes
@@ -60,7 +61,12 @@ class ReadSurface:
         """Points on the triangles, moved onto a smooth surface through their vertices, smooth but for creases."""
         smooth = [part.frames.cut_along(part.sharp) if part.sharp.any() else part.frames for part in self.parts]
         apart = _together([(torch.from_numpy(of.points), of.topology) for of in smooth])
-        return on_curved_surface(points, *apart, min(self.rings))
+        fits = [
+            fitted_curvature(torch.from_numpy(of.points), of.topology, rings=rings)
+            for of, rings in zip(smooth, self.rings, strict=True)
+        ]
+        normals, operators = torch.cat([of.normals for of in fits]), torch.cat([of.operators for of in fits])
+        return on_curved_surface(points, *apart, normals, operators)
 
     @cached_property
     def frames(self) -> FaceFrames:
