@@ -7,15 +7,19 @@ from meshing_tools import irregular
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.geometry import ReferenceSurface
-from torchfair.meshing import MeshingSettings, principal_quads
-from torchfair.meshing.curved_surface import on_curved_surface
+from torchfair.geometry import ReferenceSurface, fitted_curvature
+from torchfair.meshing import MeshingSettings, curved_surface, principal_quads
 from torchfair.shapes import Torus
 
 
 def inside(vertices: Tensor, topology: Topology, weights: tuple[float, float, float]) -> Tensor:
     """A point in every triangle."""
     return (vertices[topology.triangles] * torch.tensor(weights)[:, None]).sum(1)
+
+
+def on_curved_surface(points: Tensor, vertices: Tensor, topology: Topology) -> Tensor:
+    fitted = fitted_curvature(vertices, topology, rings=2)
+    return curved_surface.on_curved_surface(points, vertices, topology, fitted.normals, fitted.operators)
 
 
 def off_the_torus(points: Tensor) -> float:

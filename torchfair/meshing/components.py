@@ -15,6 +15,7 @@ from .._numbers import check_count, check_number
 from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
+from ..geometry import fitted_curvature
 from ..topology import Topology
 from .attempt import PieceMesh
 from .curvature_sizes import CurvatureSizes
@@ -58,8 +59,10 @@ class ReadSurface:
 
     def curved(self, points: Tensor) -> Tensor:
         """Points on the triangles, moved onto a smooth surface through their vertices, smooth but for creases."""
-        smooth = self.smooth_frames
-        return on_curved_surface(points, torch.from_numpy(smooth.points), smooth.topology, min(self.rings))
+        smooth, rings = self.smooth_frames, zip(self._smooth_parts, self.rings, strict=True)
+        fits = [fitted_curvature(torch.from_numpy(of.points), of.topology, rings=many) for of, many in rings]
+        normals, operators = torch.cat([of.normals for of in fits]), torch.cat([of.operators for of in fits])
+        return on_curved_surface(points, torch.from_numpy(smooth.points), smooth.topology, normals, operators)
 
     @cached_property
     def frames(self) -> FaceFrames:
@@ -71,8 +74,11 @@ class ReadSurface:
         """Of all components, with triangles apart from each other along creases."""
         if not any(part.sharp.any() for part in self.parts):
             return self.frames
-        apart = [part.frames.cut_along(part.sharp) for part in self.parts]
-        return FaceFrames.of(*_together([(torch.from_numpy(of.points), of.topology) for of in apart]))
+        return FaceFrames.of(*_together([(torch.from_numpy(of.points), of.topology) for of in self._smooth_parts]))
+
+    @cached_property
+    def _smooth_parts(self) -> list[FaceFrames]:
+        return [part.frames.cut_along(part.sharp) if part.sharp.any() else part.frames for part in self.parts]
 
     @cached_property
     def directions(self) -> Directions:

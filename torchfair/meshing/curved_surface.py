@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..geometry import ReferenceSurface, fitted_curvature
+from ..geometry import ReferenceSurface
 from ..topology import Topology
 
 _AT_VERTEX = 1 - 1e-9  # barycentric coordinate
@@ -13,7 +13,9 @@ _STRAIGHT = 0.8  # cosine between a normal and those of the faces around: less i
 _MOST = 0.2  # move over the longest side of a triangle
 
 
-def on_curved_surface(points: Tensor, vertices: Tensor, topology: Topology, rings: int = 2) -> Tensor:
+def on_curved_surface(
+    points: Tensor, vertices: Tensor, topology: Topology, normals: Tensor, operators: Tensor
+) -> Tensor:
     r"""Points of triangles moved onto a surface that bends as the curvature at the vertices says, (n, 3).
 
     At a vertex v with the normal n and the shape operator S the surface has the height ``-x S x / 2`` over its
@@ -28,18 +30,18 @@ def on_curved_surface(points: Tensor, vertices: Tensor, topology: Topology, ring
         points: (n, 3) on the triangles.
         vertices: (V, 3) float64.
         topology: triangles.
-        rings: over which curvature is fitted; see :func:`torchfair.geometry.fitted_curvature`.
+        normals: (V, 3) of :func:`torchfair.geometry.fitted_curvature`.
+        operators: (V, 3, 3) of the same.
     """
-    fitted = fitted_curvature(vertices, topology, rings=rings)
     closest = ReferenceSurface(vertices, topology).closest(points)
     corners = topology.triangles[closest.faces]
     away = points[:, None] - vertices[corners]
-    normals = fitted.normals[corners]
-    bent = (away[..., None, :] @ fitted.operators[corners] @ away[..., None])[..., 0, 0]
-    above = -bent / 2 - (normals * away).sum(-1)
-    weights = closest.weights * _straight(vertices, topology, fitted.normals)[corners]
+    along = normals[corners]
+    bent = (away[..., None, :] @ operators[corners] @ away[..., None])[..., 0, 0]
+    above = -bent / 2 - (along * away).sum(-1)
+    weights = closest.weights * _straight(vertices, topology, normals)[corners]
     weights = torch.where(closest.weights.amax(1, keepdim=True) < _AT_VERTEX, weights, 0.0)
-    moves = (weights[..., None] * above[..., None] * normals).sum(1)
+    moves = (weights[..., None] * above[..., None] * along).sum(1)
     sides = (vertices[corners] - vertices[corners.roll(1, 1)]).norm(dim=-1).amax(1)
     most = _MOST * sides / moves.norm(dim=1).clamp_min(1e-300)
     moved: Tensor = points + moves * most.clamp_max(1.0)[:, None]
