@@ -14,6 +14,8 @@ from .cut_graph import CutGraph, dual_graph
 from .seams import ROTATIONS, Seams
 
 _WEIGHT = 1e3  # of a step that is asked for, over the largest of the metric
+_PAIRS = 100  # looked at: rough surfaces have thousands, and no lattice that keeps all of them apart
+_ROUNDS = 8
 
 
 def gaps(frames: FaceFrames, graph: CutGraph, seams: Seams, radius: float) -> sp.csr_matrix:
@@ -23,7 +25,7 @@ def gaps(frames: FaceFrames, graph: CutGraph, seams: Seams, radius: float) -> sp
         frames: of the triangles.
         graph: the cut.
         seams: its copies.
-        radius: pairs that are farther from each other on the surface are left out.
+        radius: pairs that are farther from each other on the surface are left out; of many the nearest hundred stay.
     """
     singular = np.flatnonzero(graph.charges)
     at = [np.flatnonzero((frames.triangles == vertex).any(1)) for vertex in singular]
@@ -31,15 +33,17 @@ def gaps(frames: FaceFrames, graph: CutGraph, seams: Seams, radius: float) -> sp
         return sp.csr_matrix(np.zeros((0, len(seams.vertex)), complex))
     starts = np.array([faces[0] for faces in at])
     distance, before = dijkstra(dual_graph(frames), indices=starts, limit=radius, return_predecessors=True)
-    rows: list[dict[int, complex]] = []
-    for first in range(len(singular)):
-        for second in range(first + 1, len(singular)):
-            face = int(at[second][np.argmin(distance[first, at[second]])])
-            if np.isfinite(distance[first, face]):
-                path = [face]
-                while path[-1] != starts[first]:
-                    path.append(int(before[first, path[-1]]))
-                rows.append(_gap(frames, graph, seams, path[::-1], int(singular[first]), int(singular[second])))
+    pairs = []
+    for first, second in itertools.combinations(range(len(singular)), 2):
+        face = int(at[second][np.argmin(distance[first, at[second]])])
+        if np.isfinite(distance[first, face]):
+            pairs.append((float(distance[first, face]), first, second, face))
+    rows = []
+    for _, first, second, face in sorted(sorted(pairs)[:_PAIRS], key=lambda pair: pair[1:]):
+        path = [face]
+        while path[-1] != starts[first]:
+            path.append(int(before[first, path[-1]]))
+        rows.append(_gap(frames, graph, seams, path[::-1], int(singular[first]), int(singular[second])))
     places = [(row, copy, number) for row, terms in enumerate(rows) for copy, number in terms.items()]
     numbers = np.array([number for _, _, number in places], complex)
     where = np.array([(row, copy) for row, copy, _ in places], np.int64).reshape(-1, 2).T
@@ -91,7 +95,7 @@ def separate_vectors(metric: Floats, target: Floats, rows: Floats, offsets: Floa
     wanted = (rows @ target + offsets).reshape(-1, 2)
     stiff, right = metric, metric @ target
     done: set[int] = set()
-    for _ in range(len(wanted)):
+    for _ in range(min(len(wanted), _ROUNDS)):
         new = set(np.flatnonzero(_together(rows, offsets, vectors[0])).tolist()) - done
         if not new:
             break
