@@ -5,6 +5,7 @@ With a folder as argument the pictures go there.
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 
@@ -32,6 +33,7 @@ def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES
     draw(folder / "meshing_stages.png", stages())
     draw(folder / "meshing_adaptive.png", spacings())
+    draw_creases(folder / "meshing_creases.png")
 
 
 def stages() -> dict[str, Panel]:
@@ -81,6 +83,36 @@ def draw(path: Path, panels: dict[str, Panel]) -> None:
         left = MARGIN + column * CELL
         painted = picture.paint(shade_faces(points, connectivity, camera), edges=edges)
         sheet.image(painted, left + 12, MARGIN)
+        sheet.text(words, left + CELL / 2, MARGIN + HEIGHT + CAPTION / 2, 21, ha="center", va="center")
+    sheet.write(path, overwrite=True)
+
+
+def draw_creases(path: Path) -> None:
+    """Creases that are lines of the mesh, and others that cut cells."""
+    x, y = torch.meshgrid(torch.linspace(-1, 1, 61), torch.linspace(-1, 1, 61), indexing="ij")
+    turn = (math.pi * (x + 0.5)).clamp(0, math.pi)  # half a circle of the radius 1/2 along x, level beside it
+    across = torch.where(x.abs() <= 0.5, -0.5 * turn.cos(), x)
+    heights = {
+        "creases as lines": (across, 0.5 * turn.sin()),
+        "and as cuts": (x, 0.7 - 0.7 * torch.maximum(x.abs(), y.abs())),
+    }
+    sheet = Sheet(2 * MARGIN + 2 * CELL, 2 * MARGIN + HEIGHT + CAPTION)
+    for column, (words, (along, height)) in enumerate(heights.items()):
+        points = torch.stack([along, y, height], -1).reshape(-1, 3).double()
+        corner = torch.arange(61 * 61).reshape(61, 61)
+        quads = torch.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], -1).reshape(-1, 4)
+        falls = points[quads].mean(1)[:, :2].prod(1) < 0  # cut along the diagonals of the square
+        quads = torch.where(falls[:, None], quads.roll(1, 1), quads)
+        triangles = torch.cat([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        found = principal_quads(points, Topology.from_faces(triangles, len(points)), count=240)
+        view = view_direction(found.vertices, found.topology)
+        camera, size = fit_camera(
+            found.vertices, towards_eye=view.towards_eye, up=view.up, width=CELL - 24, height=HEIGHT
+        )
+        picture = MeshView(found.vertices, found.topology, camera, size)
+        shaded = shade_faces(found.vertices, found.topology, camera)
+        left = MARGIN + column * CELL
+        sheet.image(picture.paint(shaded, edges=quiet_edges(picture, found.creases.edges)), left + 12, MARGIN)
         sheet.text(words, left + CELL / 2, MARGIN + HEIGHT + CAPTION / 2, 21, ha="center", va="center")
     sheet.write(path, overwrite=True)
 

@@ -33,6 +33,7 @@ FILES = {TRIANGLES: "surface.obj", PANELS: "triangles.obj", QUADS: "principal_qu
          PLANAR: "planar_quads.obj"}  # fmt: skip
 VIEW = direction(-0.25, -1.0, 0.06)
 _LENGTH, _HEIGHT = 4.4, 1.8
+_SINGLE = 1600  # columns of pixels of pictures of one mesh, at most
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def experiment(config: Config, results: Results) -> Report:
         results.mesh(FILES[name], *mesh)
     draw(config, meshes, reference, report, results)
     draw_facade(config, meshes[PLANAR], results)
-    same = {"view": VIEW, "width": config.width // 2, "overwrite": results.force}
+    same = {"view": VIEW, "width": min(config.width, _SINGLE), "overwrite": results.force}
     picture_curvature(results.path(CURVATURE), [("surface of least C", *surface)], **same)
     shown = {name: mesh for name, mesh in meshes.items() if name != PANELS}
     picture_edges(results.path(EDGES), {name: v for name, (v, _) in shown.items()}, [t for _, t in shown.values()],
@@ -117,9 +118,10 @@ def draw(config: Config, meshes: dict[str, Mesh], reference: SmoothReference, re
 
 def draw_facade(config: Config, mesh: Mesh, results: Results) -> None:
     """The planar quads alone, larger, as the street would see them."""
-    camera, pixels = fit_camera(mesh[0], towards_eye=VIEW.towards_eye, up=VIEW.up, width=config.width // 2,
+    width = min(config.width, _SINGLE)
+    camera, pixels = fit_camera(mesh[0], towards_eye=VIEW.towards_eye, up=VIEW.up, width=width,
                                 margin=0.02)  # fmt: skip
-    sheet = Sheet(config.width // 2, pixels[0])
+    sheet = Sheet(width, pixels[0])
     sheet.image(mirror_picture(Mirror(*mesh), camera, pixels, evening_sky(), joints=2 * config.joints), 0, 0)
     sheet.write(results.path(GLASS), overwrite=results.force)
 

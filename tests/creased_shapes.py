@@ -13,9 +13,10 @@ from torch import Tensor
 from torchfair import Topology
 
 Mesh = tuple[Tensor, Topology]
+Arrays = tuple[np.ndarray, np.ndarray]
 
 
-def welded(*patches: tuple[np.ndarray, np.ndarray]) -> Mesh:
+def welded(*patches: Arrays) -> Mesh:
     """One mesh of patches of triangles, their vertices joined where they coincide."""
     points = np.concatenate([points for points, _ in patches])
     offsets = np.cumsum([0, *(len(points) for points, _ in patches[:-1])])
@@ -97,17 +98,12 @@ def pyramid() -> Mesh:
     return graph(lambda x, y: 0.8 * (1 - np.maximum(np.abs(x), np.abs(y))))
 
 
-def groin_vault() -> Mesh:
-    """Two cylinders that cross: creases over the diagonals, at 45 degrees to the principal directions."""
-    return graph(lambda x, y: np.sqrt(1.3 - np.minimum(np.abs(x), np.abs(y)) ** 2 * 0) - 0.9 * np.maximum(x**2, y**2))
-
-
 def fading_fold() -> Mesh:
     """A ridge that ends inside the sheet."""
     return graph(lambda x, y: -0.8 * np.abs(x) * np.clip(-y, 0, 1) - 0.15 * x**2)
 
 
-def can(slope: float = 0.0, around: int = 48, lid: float = 1.0) -> Mesh:
+def can(slope: float = 0.0, around: int = 48) -> Mesh:
     """A cylinder with flat lids; the upper one leans by a slope."""
 
     def side(u: np.ndarray, v: np.ndarray) -> list[np.ndarray]:
@@ -127,8 +123,7 @@ def can(slope: float = 0.0, around: int = 48, lid: float = 1.0) -> Mesh:
     points, faces = patch(disk, count, count)
     top = points.copy()
     top[:, 2] = 1.6 + slope * top[:, 0]
-    pieces = [patch(side, around + 1, 17)]
-    return welded(*pieces, (top, faces), (points, faces[:, ::-1])) if lid else welded(*pieces)
+    return welded(patch(side, around + 1, 17), (top, faces), (points, faces[:, ::-1]))
 
 
 def drilled_box(around: int = 48, count: int = 9) -> Mesh:
@@ -145,7 +140,7 @@ def drilled_box(around: int = 48, count: int = 9) -> Mesh:
         y = np.choose(side, [along, 1 + 0 * along, -along, -1 + 0 * along])
         return x, y
 
-    def ring(z: float, up: bool) -> tuple:
+    def ring(z: float, up: bool) -> Arrays:
         def place(u: np.ndarray, v: np.ndarray) -> list[np.ndarray]:
             (x, y), (a, b) = turn(u), square(u)
             return [0.5 * x * (1 - v) + a * v, 0.5 * y * (1 - v) + b * v, z + 0 * u]
@@ -153,7 +148,7 @@ def drilled_box(around: int = 48, count: int = 9) -> Mesh:
         points, faces = patch(place, around + 1, count)
         return points, faces[:, ::-1] if up else faces
 
-    def wall(curve: Callable, scale: float, inside: bool) -> tuple:
+    def wall(curve: Callable[[np.ndarray], Arrays], scale: float, inside: bool) -> Arrays:
         def place(u: np.ndarray, v: np.ndarray) -> list[np.ndarray]:
             x, y = curve(u)
             return [scale * x, scale * y, v * 0.8]

@@ -237,3 +237,67 @@ def test_marks_of_single_edges_stay_single_and_bad_ones_are_refused_first(
     assert main(["fair", str(tmp_path / "bad.obj"), "-o", str(tmp_path / "bad" / "out.obj"), *QUIET]) == 2
     assert "not joined by an edge" in error_line(capsys)
     assert not (tmp_path / "bad").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["14", "15"], {14, 15}),
+        (["near", "2.1", "2.9", "0"], None),
+        (["box", "9", "9", "9", "-9", "-9", "-9"], set(range(42))),
+    ],
+)
+def test_fixed_vertices_stay_where_they_are(
+    words: list[str], expected: set[int] | None, roof: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "out" / "roof.obj"
+    assert main(["fair", str(roof), "-o", str(output), "--fix", *words, *QUIET]) == 0
+    before, after = load_mesh(roof).vertices, load_mesh(output).vertices
+    if expected is None:
+        place = before.new_tensor([float(word) for word in words[1:]])
+        expected = {int((before - place).norm(dim=1).argmin())}
+    chosen = sorted(expected)
+    assert torch.equal(before[chosen], after[chosen])
+    assert f"{len(chosen)} vertices are fixed" in capsys.readouterr().out
+    assert json.loads((output.parent / "report.json").read_text())["request"]["fix"] == [words]
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["near", "1", "2"], "near X Y Z"),
+        (["box", "1", "2", "3"], "box X Y Z X Y Z"),
+        (["-3"], "'-3'"),
+        (["near", "nan", "0", "0"], "near X Y Z"),
+        (["box", "90", "90", "90", "91", "91", "91"], "no vertex"),
+        (["42"], "0 to 41"),
+    ],
+)
+def test_what_cannot_be_fixed_is_refused(
+    words: list[str], named: str, roof: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fair", str(roof), "-o", str(tmp_path / "out.obj"), "--fix", *words, *QUIET]) == 2
+    assert named in capsys.readouterr().err
+    assert not (tmp_path / "out.obj").exists()
+
+
+def test_panels_that_cannot_become_planar_are_named_and_the_exit_code_is_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, output = tmp_path / "quad.obj", tmp_path / "out.obj"
+    path.write_text("v 0 0 0\nv 1 0 .14\nv 1 1 0\nv 0 1 .14\nf 1 2 3 4\n")
+    command = ["fair", str(path), "-o", str(output), "--planar", "quads", "--no-pictures"]
+    assert main([*command, "--boundary", "fixed"]) == 1
+    out = capsys.readouterr().out
+    assert "NOT REACHED; 1 of 1, counted from 0: 0 (" in out
+    assert "are kept planar" not in out
+    assert torch.equal(load_mesh(output).vertices, load_mesh(path).vertices)
+
+
+def test_a_reference_in_another_unit_is_refused(roof: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = load_mesh(roof)
+    save_mesh(tmp_path / "millimetres.obj", 1000.0 * mesh.vertices, mesh.topology)
+    command = ["fair", str(roof), "-o", str(tmp_path / "out.obj"), *QUIET]
+    assert main([*command, "--reference", str(tmp_path / "millimetres.obj")]) == 2
+    assert "divide it by 1000" in error_line(capsys)
+    assert not (tmp_path / "out.obj").exists()

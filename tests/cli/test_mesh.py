@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from creased_shapes import folded_sheet
 from PIL import Image
 
 from torchfair.cli import main
@@ -107,6 +108,17 @@ def test_ctrl_c_keeps_the_best_mesh(
     assert out.splitlines()[-1] == report["not_reached"][0]
     assert out.count("NOT REACHED") == 1
     assert "interrupted" in out
+
+
+def test_creases_are_kept_and_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, output = tmp_path / "sheet.obj", tmp_path / "out" / "quads.obj"
+    save_mesh(path, *folded_sheet())
+    assert main(["mesh", str(path), "-o", str(output), "--quads", "60"]) == 0
+    report = json.loads((output.parent / "report.json").read_text())
+    assert report["measures"]["crease_edges"] > 3
+    assert "edges along creases" in capsys.readouterr().out
+    with Image.open(output.parent / "mesh.png") as picture:
+        assert len(picture.convert("RGB").getcolors(1 << 24)) > 20
 
 
 @pytest.mark.parametrize(

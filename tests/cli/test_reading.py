@@ -62,6 +62,17 @@ def test_the_map_of_vertices_is_written(seam: str, tmp_path: Path, capsys: pytes
     assert load_mesh(output).topology.face_lists() == [[0, 1, 2], [0, 2, 3]]
 
 
+def test_subdivide_writes_the_map_beside(seam: str, tmp_path: Path) -> None:
+    words = ["subdivide", seam, "--weld", "--scheme", "midpoint", "-o", str(tmp_path / "fine.obj")]
+    assert main(words) == 0
+    numbers = json.loads((tmp_path / "fine.vertices.json").read_text())["vertex_map"]
+    assert numbers == [0, 1, 2, 0, 2, 3]
+    assert load_mesh(tmp_path / "fine.obj").vertices[numbers].equal(load_mesh(seam).vertices)
+    (tmp_path / "fine.obj").unlink()
+    assert main(words) == 2
+    assert not (tmp_path / "fine.obj").exists()
+
+
 def test_handles_and_marks_keep_the_numbers_of_the_file(tmp_path: Path) -> None:
     """Welding renumbers vertices behind; the handle is still the one that was named, and marked edges stay marked."""
     points, topology = wavy_grid(4, 4)

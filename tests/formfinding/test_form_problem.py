@@ -14,6 +14,7 @@ from torchfair.curves import ClosedCurve
 from torchfair.energies import total_absolute_curvature
 from torchfair.formfinding import FormRecipe, FormSettings, start_surface
 from torchfair.formfinding.form.boundary_track import BoundaryTrack
+from torchfair.formfinding.form.measures import warp_notes
 from torchfair.formfinding.form.problem import FormProblem, staying_vertices
 from torchfair.formfinding.form.rim import Rim
 from torchfair.formfinding.job import Pulls
@@ -181,3 +182,12 @@ def test_start_annuli_have_the_number_of_vertices_and_even_triangles(count: int)
     lengths = edge_lengths(vertices, topology)
     level = (vertices[topology.edges][..., 2].diff(dim=1).abs() < 1e-9).squeeze(1)
     assert float(lengths[level].mean() / lengths[~level].mean()) == pytest.approx(1.0, abs=0.08)
+
+
+def test_faces_that_are_warped_now_are_told_of() -> None:
+    """Only where they were nearly planar: C is lowered on triangles."""
+    flat, nearly, bent = ({"largest_planarity_of_all": value} for value in (1e-9, 4e-3, 0.1))
+    for before, after, told in ((flat, bent, True), (nearly, bent, True), (bent, bent, False), (flat, nearly, False)):
+        assert (len(warp_notes(before, after)) == 1) is told
+    (note,) = warp_notes(flat, bent)
+    assert "warped by up to 0.1" in note

@@ -161,7 +161,8 @@ def format_vertices(worst: list[dict[str, Any]], first_number: int = 0) -> str:
     lines = [
         "",
         "worst vertices (counted from 0, as for --vertex, and as in the file, from "
-        f"{first_number}; perimeter of the normal pyramid in degrees; edges above and below the plane at the normal)",
+        f"{first_number}, by which edges to flip are named, too; perimeter of the normal pyramid in degrees; "
+        "edges above and below the plane at the normal)",
         f"  {'vertex':>9} {'in file':>9} {'valence':>8} {'class':>12} {'crossings':>10} {'perimeter':>10}  "
         f"{'x y z':<32}  edges",
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -97,6 +98,8 @@ class JobCommand(ABC):
         request = self.read(arguments, settings)
         settings = request.settings or settings
         outputs.make_folders()
+        for warning in request.warnings:
+            print(f"{self.name}: warning: {warning}", file=sys.stderr, flush=True)
         mesh = request.mesh
         with in_numbers_of(mesh):
             result = self._solve(request, settings)

@@ -30,8 +30,9 @@ NAME = "torchfair mesh"
 _DESCRIPTION = (
     "Makes a mesh of a surface whose edges follow its principal curvature lines: quads, which are then nearly planar "
     "and have the least E of all, or a half-shifted lattice of triangles, from which 'torchfair symmetric' starts. "
-    "Vertices lie on a smooth surface through those given; corners of the boundary stay, and parts of it that follow "
-    "a direction become lines of the mesh. The topology is that of the surface, or nothing is written."
+    "Vertices lie on a smooth surface through those given; sharp edges and corners of the boundary stay, and what of "
+    "them and the boundary follows a direction becomes lines of the mesh. The topology is that of the surface, or "
+    "nothing is written."
 )
 _ROWS = {
     "faces": "faces",
@@ -47,6 +48,10 @@ _ROWS = {
     "spacing_shortest": "shortest spacing asked for",
     "spacing_longest": "longest ...",
     "range_share": "share of the surface at the ends of the range",
+}
+_CREASE_ROWS = {
+    "crease_edges": "edges along creases",
+    "crease_distance_max": "largest distance from creases, in mean edges",
 }
 
 
@@ -146,7 +151,10 @@ def draw_singular(path: Path, request: Request, result: Any, overwrite: bool) ->
         picture_principal_edges(path, {"principal edges": (result.vertices, result.principal)}, overwrite=overwrite)
         return
     points, indices = result.singular_points, result.singular_indices
-    picture_principal_mesh(path, result.vertices, result.topology, points, indices, overwrite=overwrite)
+    creases = result.creases.edges
+    picture_principal_mesh(
+        path, result.vertices, result.topology, points, indices, creases=creases, overwrite=overwrite
+    )
 
 
 def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
@@ -158,8 +166,9 @@ def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
 
 def table(report: Mapping[str, Any]) -> list[str]:
     """What was measured on a principal mesh, one line for each."""
-    width = max(map(len, _ROWS.values()))
-    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in _ROWS.items() if name in report]
+    rows = _ROWS | _CREASE_ROWS if report["crease_edges"] else _ROWS
+    width = max(map(len, rows.values()))
+    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in rows.items() if name in report]
     found = ", ".join(f"{count} of index {index}" for index, count in report["singular"].items())
     return [*lines, f"{'singular points':<{width}}  {found or 'none':>10}"]
 

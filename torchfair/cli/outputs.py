@@ -31,6 +31,7 @@ class Request:
         options: Arguments of the function that does it, by name, beside settings and callback.
         start: Its first arguments; by default vertices and topology of the mesh.
         notes: What was decided while reading, in words.
+        warnings: What is likely to fail, and what to do instead; said before it is tried.
         marks: Marked edges (E,) of the mesh, which go with it; None for none.
         settings: To solve with; by default those that options ask for.
         report: Entries of ``report.json`` beside those that all jobs have.
@@ -42,6 +43,7 @@ class Request:
     options: dict[str, Any]
     start: Sequence[Any] = ()
     notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     settings: Any = None
     marks: Tensor | None = None
     report: dict[str, Any] = field(default_factory=dict)

@@ -65,6 +65,9 @@ def run(arguments: argparse.Namespace) -> int:
     marks = _marks(arguments, mesh)
     if marks is not None and beside is not None:
         refuse_existing([beside], force=arguments.force)
+    numbers = output.with_suffix(".vertices.json")
+    if mesh.vertex_map is not None:
+        refuse_existing([numbers], force=arguments.force)
     scheme: Any = arguments.scheme.replace("-", "_")
     corners = boundary_corners(mesh.vertices, mesh.topology, math.radians(arguments.corner_angle))
     with in_numbers_of(mesh):
@@ -86,6 +89,11 @@ def run(arguments: argparse.Namespace) -> int:
 
         save_edge_labels(beside, step.topology, fine, overwrite=arguments.force)
         written.append(beside)
+    if mesh.vertex_map is not None:
+        from ..io import atomic_write_text, to_json
+
+        atomic_write_text(numbers, to_json({"vertex_map": mesh.vertex_map}), overwrite=arguments.force)
+        written.append(numbers)
     counts = [f"{t.num_vertices} vertices, {t.num_faces} faces" for t in (mesh.topology, step.topology)]
     print("\n".join([*notes, f"{counts[0]} to {counts[1]}", *(f"wrote {path}" for path in written)]))
     return 0

@@ -15,7 +15,7 @@ from .job_command import JobCommand
 from .outputs import Outputs, Request, Writer
 from .pictures import draw_edges
 from .strips import StripFiles, add_strips
-from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edges, vertex_mask
+from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edges, slide_warnings, vertex_mask
 from .symmetric_quads import even_settings, read_quads
 
 if TYPE_CHECKING:
@@ -103,7 +103,9 @@ class SymmetricCommand(JobCommand):
             "on": polyline_vertices(arguments.on, mesh, edges) if arguments.on else None,
             "levels": arguments.levels,
         }
-        return Request(mesh, options, (mesh.vertices, edges), notes, settings)
+        keeps_shape = not (settings.free or handles or options["reference"])
+        warnings = slide_warnings(arguments.input, mesh, edges) if keeps_shape else []
+        return Request(mesh, options, (mesh.vertices, edges), notes, warnings, settings)
 
     def most_steps(self, settings: Any) -> int:
         """Those of a level."""

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from ..principal import PrincipalEdges
 
 
+_FEW_EXCEPTIONS = 0.1  # share of regular vertices at which marks of INPUT may not fit together
+_MOST_SLIDE = 1.4
+"""Edges. Turned lattices of 10 and 20 rows on six surfaces were met up to 1.36 and mostly missed from 1.45 on."""
+
 _OPTIONS = {
     "allow_exceptions=True": "--allow-exceptions",
     "seed_edge:": "--seed:",
@@ -65,9 +69,18 @@ def _chosen_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[Pri
     file = marks_file(arguments)
     if file is not None:
         edges = PrincipalEdges(topology, load_edge_labels(file, topology))
-        return (edges if allow else edges.check()), f"principal edges are those of {file}"
+        own = arguments.labels is None  # marks of INPUT itself, such as those of torchfair mesh
+        return (
+            edges if allow or (own and _mostly_fit(edges)) else edges.check()
+        ), f"principal edges are those of {file}"
     aligned = principal_edges_from_directions(mesh.vertices, topology, allow_exceptions=allow)
     return aligned.edges, "principal edges are the family that follows principal directions best"
+
+
+def _mostly_fit(edges: PrincipalEdges) -> bool:
+    """Whether principal edges do not fit together at a few vertices only."""
+    wrong = edges.exceptions.numel()
+    return wrong <= _FEW_EXCEPTIONS * (wrong + edges.stars().vertices.numel())
 
 
 def _alignment(origin: str, misalignment: float) -> str:
@@ -81,6 +94,25 @@ def _alignment(origin: str, misalignment: float) -> str:
         f"{words}. WARNING: edges at random are 0.39 off; the surface will have to bend to fit such edges. Choose "
         "another family by one of its edges, with --seed V W, or remesh by torchfair mesh --triangles N"
     )
+
+
+def slide_warnings(name: str, mesh: PolygonMesh, edges: PrincipalEdges) -> list[str]:
+    """What to do where principal edges are too far off for a mesh to become symmetric in its shape.
+
+    To turn them, vertices on the rim slide by their angle times half the width of the mesh, about sqrt(V) / 2 edges.
+    """
+    from ..principal import misalignment_of
+
+    angle = misalignment_of(mesh.vertices, edges)
+    slide = 0.5 * angle * float(mesh.topology.num_vertices) ** 0.5
+    if slide <= _MOST_SLIDE:
+        return []
+    return [
+        f"principal edges are {angle:.2f} radians off the nearer principal direction on average: to follow it, "
+        f"vertices would slide by about {slide:.1f} edges, and above {_MOST_SLIDE} most surfaces bend or get less "
+        f"smooth. Rather lay edges anew: torchfair mesh {name} --triangles {mesh.topology.num_faces} -o lattice.obj, "
+        "then torchfair symmetric lattice.obj; or let the surface bend by --free"
+    ]
 
 
 def vertex_mask(option: str, chosen: Sequence[int], mesh: PolygonMesh) -> Tensor:

@@ -35,10 +35,11 @@ def unit_of(vertices: Tensor) -> Tensor:
 
 
 def _unit(extents: Tensor, low: float, high: float) -> Tensor:
-    beyond = ((extents < low) & (extents > 0.0)) | ((extents > high) & torch.isfinite(extents))
-    powers = torch.floor(torch.log2(torch.where(beyond, extents, 1.0)))
-    most = float(math.frexp(torch.finfo(extents.dtype).max)[1] - 4)
-    return torch.exp2(torch.where(beyond, powers - _TARGET, 0.0).clamp(-most, most))
+    """1 where an extent is ordinary, zero or no number; else what makes it about ``2 ** _TARGET``."""
+    beyond = (extents > high) | ((extents < low) & (extents > 0.0))
+    powers = torch.floor(torch.log2(extents)) - _TARGET
+    least = math.log2(torch.finfo(extents.dtype).tiny) + 4.0
+    return torch.exp2(torch.where(beyond, powers.clamp(min=least), 0.0))
 
 
 def bring_to_unit(positions: Tensor) -> Tensor:
@@ -46,7 +47,6 @@ def bring_to_unit(positions: Tensor) -> Tensor:
     if not positions.shape[-1]:
         return positions.new_ones(positions.shape[1])
     low, high = ordinary_extents(positions.dtype)
-    smallest, largest = positions.aminmax(dim=-1)
-    unit = _unit((largest - smallest).amax(0), low, high)
-    positions.div_(unit[:, None])
+    unit = _unit((positions.amax(-1) - positions.amin(-1)).amax(0), low, high)
+    positions.mul_(unit.reciprocal()[:, None])
     return unit

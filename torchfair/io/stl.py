@@ -19,7 +19,7 @@ from .text import check_text, quote, split_words, to_floats
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEAD = 84
 _KEYWORDS = frozenset(b"solid facet outer vertex endloop endfacet endsolid".split())
-_ULPS = 2.0**-22  # of the largest coordinate: two units in the last place of single precision
+_ULPS = 2.0**-21  # of the largest coordinate: two corners, each a unit in the last place off in every direction
 
 
 def read_stl(path: Path, data: bytes) -> RawMesh:

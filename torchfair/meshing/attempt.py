@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -26,11 +26,12 @@ from .settings import MeshingSettings
 from .surface import DesignSurface
 from .tracing import Cells, trace_cells
 from .untangling import untangled
-from .verification import shape_of, verified_topology
+from .verification import shape_of, verified_topology, verify_creases
 
 _ANISOTROPY = 30.0  # of the map: 1 triples the angles to directions, 300 wins little and stretches edges
 _UNTANGLED = 2  # maps, the best first
 _SHORTEST_RUN = 1.5  # spacings
+_APART = 1.5  # spacings
 
 
 @dataclass(frozen=True)
@@ -41,13 +42,15 @@ class Plan:
         spacing: length of edges.
         smoothing: length over which directions are smoothed.
         align: whether boundary runs and creases become lines.
-        creases: whether creases are kept at all.
+        creases: whether they are kept.
+        apart: (n, 3) places near which creases do not become lines.
     """
 
     spacing: float
     smoothing: float
     align: bool
     creases: bool = True
+    apart: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 class FailedAttemptError(MeshError):
@@ -97,7 +100,8 @@ def attempt(
     seams = find_seams(frames, graph)
     spacings = _spacings(surface, graph, plan)
     shortest, components = _SHORTEST_RUN * spacings.max(1), lattice.aligned if plan.align else ()
-    lines = crease_lines(frames, graph, seams, creases, settings.boundary_angle, shortest, components)
+    far = creases.away_from(frames.points, plan.apart, _APART * plan.spacing)
+    lines = crease_lines(frames, graph, seams, creases, far, settings.boundary_angle, shortest, components)
     graph = replace(graph, nodes=graph.nodes | lines.pinned)
     runs = find_runs(frames, graph, settings.boundary_angle, shortest, components) if settings.align_boundary else []
     corners = boundary_corners(surface.vertices, surface.topology, settings.corner_angle).numpy() | creases.corners
@@ -106,7 +110,8 @@ def attempt(
         cells = trace_cells(found, off_the_lines(found, runs, lines), corners & ~graph.nodes, lines)
         near = spacings[KDTree(frames.centres).query(cells.positions)[1]] if surface.sizes else spacings[:1]
         whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1)))
-        verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
+        made = verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
+        verify_creases(made, whole.creases, creases)
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None
     singular = np.flatnonzero(graph.charges)

@@ -59,19 +59,27 @@ class ReadSurface:
 
     def curved(self, points: Tensor) -> Tensor:
         """Points on the triangles, moved onto a smooth surface through their vertices, smooth but for creases."""
-        smooth = [part.frames.cut_along(part.sharp) if part.sharp.any() else part.frames for part in self.parts]
-        apart = _together([(torch.from_numpy(of.points), of.topology) for of in smooth])
+        apart = [part.frames.cut_along(part.sharp) if part.sharp.any() else part.frames for part in self.parts]
         fits = [
             fitted_curvature(torch.from_numpy(of.points), of.topology, rings=rings)
-            for of, rings in zip(smooth, self.rings, strict=True)
+            for of, rings in zip(apart, self.rings, strict=True)
         ]
         normals, operators = torch.cat([of.normals for of in fits]), torch.cat([of.operators for of in fits])
-        return on_curved_surface(points, *apart, normals, operators)
+        smooth = self.smooth_frames
+        return on_curved_surface(points, torch.from_numpy(smooth.points), smooth.topology, normals, operators)
 
     @cached_property
     def frames(self) -> FaceFrames:
         """Of all components."""
         return FaceFrames.of(*self.whole)
+
+    @cached_property
+    def smooth_frames(self) -> FaceFrames:
+        """Of all components, with triangles apart from each other along creases."""
+        if not any(part.sharp.any() for part in self.parts):
+            return self.frames
+        apart = [part.frames.cut_along(part.sharp) for part in self.parts]
+        return FaceFrames.of(*_together([(torch.from_numpy(of.points), of.topology) for of in apart]))
 
     @cached_property
     def directions(self) -> Directions:

@@ -48,7 +48,7 @@ def crease_darts(frames: FaceFrames, lines: CreaseLines, crossings: Crossings, n
     darts: list[tuple[int, int, bool, int]] = []
     for number, chain in enumerate(lines.creases.chains):
         stops = _stops(frames, chain, crossings, name)
-        if len({node for node, _, _ in stops}) < (3 if chain.is_closed else 2):
+        if len({node for node, _, _ in stops}) < (3 if chain.vertices[0] == chain.vertices[-1] else 2):
             raise BrokenLinesError("a crease is too short for edges of this length")
         coordinate = lines.coordinate(number, CUTS)
         forward = chain.forward(frames)
@@ -69,6 +69,6 @@ def _stops(frames: FaceFrames, chain: CreaseChain, crossings: Crossings, name: I
             stops.append((int(name[chain.vertices[place]]), before, place))
         here = range(crossings.offsets[edge], crossings.offsets[edge + 1])
         stops += [(node, place, place) for node in (here if forward else reversed(here))]
-    if chain.is_closed:
+    if chain.closed:
         return [*stops, *stops[:1]]
     return [*stops, (int(name[chain.vertices[-1]]), last, last)]

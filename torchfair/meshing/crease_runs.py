@@ -45,6 +45,7 @@ def crease_lines(
     graph: CutGraph,
     seams: Seams,
     creases: Creases,
+    allowed: list[bool],
     angle: float,
     shortest: float | Floats,
     components: tuple[int, ...],
@@ -56,6 +57,7 @@ def crease_lines(
         graph: the cut.
         seams: its copies.
         creases: of the surface.
+        allowed: which chains may become lines.
         angle: between a chain and the field in the mean, radians; edges may turn from it by twice as much.
         shortest: length of a chain that counts, also (F,) by the triangles on its left.
         components: coordinates whose lines run along or across the field; none where no chain is to follow it.
@@ -63,9 +65,9 @@ def crease_lines(
     least = np.broadcast_to(np.asarray(shortest), len(frames.triangles))[frames.faces[:, 0]]
     runs = [
         _follows(frames, graph, seams, chain, angle, components)
-        if components and (frames.lengths[chain.edges] / least[chain.edges]).sum() >= 1
+        if may and components and (frames.lengths[chain.edges] / least[chain.edges]).sum() >= 1
         else []
-        for chain in creases.chains
+        for chain, may in zip(creases.chains, allowed, strict=True)
     ]
     ends = [chain.vertices[[0, -1]] for chain, of in zip(creases.chains, runs, strict=True) if of]
     pinned = np.zeros(len(frames.points), bool)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from torch import Tensor
 
+from .._graph import edge_numbers
+from ..creases import crease_chains, crease_corners, crease_edges
 from ..fields import Pull
 from ..fields.direction_field import WEAK, side_angles
-from ..fields.frames import Bools, FaceFrames, Ints
-from ..geometry import dihedral_angles
+from ..fields.frames import Bools, FaceFrames, Floats, Ints
 from ..topology import Topology
 
 _FEW = 8  # loose ends
@@ -25,15 +26,13 @@ class CreaseChain:
     Attributes:
         vertices: (n,) in order; of a closed chain the first once more at its end.
         edges: (n - 1,) numbers of the interior edges between them.
+        closed: whether it has no corner.
     """
 
     vertices: Ints
     edges: Ints
 
-    @property
-    def is_closed(self) -> bool:
-        """Whether it comes back to where it starts."""
-        return bool(self.vertices[0] == self.vertices[-1])
+    closed: bool
 
     def forward(self, frames: FaceFrames) -> Bools:
         """(n - 1,) whether an edge starts where the chain comes to it."""
@@ -56,6 +55,11 @@ class Creases:
     corners: Bools
     chains: list[CreaseChain]
 
+    def away_from(self, points: Floats, places: Floats, distance: float) -> list[bool]:
+        """Which chains keep a distance from all places (n, 3); of vertices at points (V, 3)."""
+        gaps = [np.linalg.norm(points[chain.vertices][:, None] - places, axis=2) for chain in self.chains]
+        return [bool((gap > distance).all()) for gap in gaps]
+
 
 def sharp_edges(vertices: Tensor, topology: Topology, angle: float) -> Bools:
     """(I,) which interior edges bend by more than an angle; none where they are a sign of noise, with many loose ends.
@@ -65,12 +69,15 @@ def sharp_edges(vertices: Tensor, topology: Topology, angle: float) -> Bools:
         topology: triangles.
         angle: radians; 0 for none.
     """
-    if not angle:
-        return np.zeros(topology.num_interior_edges, bool)
-    sharp = (dihedral_angles(vertices, topology).abs() > angle).numpy()
-    degrees = np.bincount(topology.interior_edges.numpy()[sharp].ravel(), minlength=topology.num_vertices)
+    sharp = np.zeros(topology.num_interior_edges, bool)
+    sharp[crease_edges(vertices, topology, angle).numpy()] = True
+    degrees = _degrees(topology.interior_edges.numpy()[sharp], topology.num_vertices)
     loose = int(((degrees == 1) & ~topology.is_boundary_vertex.numpy()).sum())
-    return np.zeros_like(sharp) if loose > max(_FEW, _LOOSE * sharp.sum()) else np.asarray(sharp)
+    return np.zeros_like(sharp) if loose > max(_FEW, _LOOSE * sharp.sum()) else sharp
+
+
+def _degrees(edges: Ints, num_vertices: int) -> Ints:
+    return np.bincount(edges.ravel(), minlength=num_vertices)
 
 
 def find_creases(frames: FaceFrames, sharp: Bools, corner_angle: float, shortest: float) -> Creases:
@@ -103,35 +110,11 @@ def crease_pull(frames: FaceFrames, creases: Creases) -> tuple[Pull, Ints]:
 
 
 def _chains(frames: FaceFrames, sharp: Bools, corner_angle: float) -> Creases:
-    around: dict[int, list[int]] = defaultdict(list)
-    for edge in np.flatnonzero(sharp).tolist():
-        for vertex in frames.edges[edge].tolist():
-            around[vertex].append(edge)
-    degrees, corners = np.zeros(len(frames.points), np.int64), np.zeros(len(frames.points), bool)
-    for vertex, edges in around.items():
-        degrees[vertex] = len(edges)
-        corners[vertex] = len(edges) != 2 or frames.is_boundary[vertex] or _turn(frames, vertex, edges) > corner_angle
-    chains: list[CreaseChain] = []
-    done: set[int] = set()
-    starts = [(vertex, edge) for vertex, edges in around.items() if corners[vertex] for edge in edges]
-    for vertex, edge in starts + [(int(frames.edges[edge, 0]), edge) for edge in np.flatnonzero(sharp).tolist()]:
-        if edge not in done:
-            chains.append(_walk(frames, around, corners, vertex, edge))
-            done.update(chains[-1].edges.tolist())
-    return Creases(sharp, degrees, corners, chains)
-
-
-def _turn(frames: FaceFrames, vertex: int, edges: list[int]) -> float:
-    """Angle by which a chain turns at a vertex."""
-    before, after = (frames.points[frames.edges[edge].sum() - vertex] - frames.points[vertex] for edge in edges)
-    return float(np.arctan2(np.linalg.norm(np.cross(before, after)), -before @ after))
-
-
-def _walk(frames: FaceFrames, around: dict[int, list[int]], corners: Bools, vertex: int, edge: int) -> CreaseChain:
-    vertices, edges = [vertex], [edge]
-    while True:
-        vertices.append(int(frames.edges[edges[-1]].sum()) - vertices[-1])
-        if corners[vertices[-1]] or vertices[-1] == vertex:
-            return CreaseChain(np.array(vertices), np.array(edges))
-        first, second = around[vertices[-1]]
-        edges.append(second if first == edges[-1] else first)
+    edges, topology = torch.from_numpy(np.flatnonzero(sharp)), frames.topology
+    corners = crease_corners(torch.from_numpy(frames.points), topology, edges, corner_angle)
+    chains = []
+    for chain in crease_chains(topology, edges, corners):
+        around = torch.cat([chain.vertices, chain.vertices[:1]]) if chain.closed else chain.vertices
+        numbers = edge_numbers(topology, torch.stack([around[:-1], around[1:]], 1))
+        chains.append(CreaseChain(around.numpy(), numbers.numpy(), chain.closed))
+    return Creases(sharp, _degrees(frames.edges[sharp], len(frames.points)), corners.numpy(), chains)

@@ -48,7 +48,7 @@ def curvature_sizes(
     the uniform spacing.
 
     Args:
-        frames: of the triangles.
+        frames: of the triangles; nothing is averaged across edges that are not theirs.
         directions: of the triangles.
         spacing: the uniform one.
         longest: the longest spacing over the shortest, at least 1.

@@ -5,7 +5,10 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
+
+import numpy as np
 
 from ..errors import MeshError
 from ..fields import Directions
@@ -18,6 +21,8 @@ from .settings import MeshingSettings
 from .surface import DesignSurface
 
 _SMOOTHER = (1.0, 4.0, 16.0, 64.0)  # times the smoothing length
+_SHARE = 0.5  # of the time limit, for plans that keep creases
+_RETRIES = 2  # with creases not aligned where a map is turned over
 _SPACINGS = (1.0, 0.967, 1.037, 0.934, 1.08)  # counts up and down by 7 and 15 %
 
 
@@ -56,59 +61,72 @@ def mesh_component(
     Raises:
         NoMeshError: if none does.
     """
+    creased = bool(surface.sharp.any())
+    plain = surface.without_creases()
     began = time.process_time()
     failure: FailedAttemptError | None = None
     number = 0
 
     @cache
-    def finer(spacing: float) -> tuple[DesignSurface, Directions]:
-        return surface.cut_finer(directions, spacing)
+    def finer(spacing: float, kept: bool) -> tuple[DesignSurface, Directions]:
+        if kept or not creased:
+            return surface.cut_finer(directions, spacing)
+        return plain.cut_finer(plain.directions(settings.noise)[0], spacing)
 
     @cache
     def creases(spacing: float, kept: bool) -> Creases:
-        triangles = finer(spacing)[0]
-        sharp = triangles.sharp & kept
-        return find_creases(triangles.frames, sharp, settings.corner_angle, spacing)
+        triangles = finer(spacing, kept)[0]
+        return find_creases(triangles.frames, triangles.sharp, settings.corner_angle, spacing)
 
     @cache
     def graph(spacing: float, smoothing: float, kept: bool) -> CutGraph:
-        triangles, carried = finer(spacing)
+        triangles, carried = finer(spacing, kept)
         merging, sharp = settings.merging * spacing, creases(spacing, kept)
         return combed(triangles.frames, carried, lattice.symmetry, smoothing, merging, sharp, settings.boundary_angle)
 
-    tried = enumerate(plans(spacing, smoothing, settings, bool(surface.sharp.any())))
+    tried = enumerate(plans(spacing, smoothing, settings, creased))
     for place, (plan, words) in itertools.islice(tried, first, None):
-        late = plan.creases and time.process_time() - began > settings.time_limit
-        if number and (not settings.fallback or late):
+        limit = settings.time_limit * (_SHARE if plan.creases and creased else 1.0)
+        if number and (not settings.fallback or time.process_time() - began > limit):
             continue
-        number += 1
-        try:
-            field = graph(plan.spacing, plan.smoothing, plan.creases)
-            sharp = creases(plan.spacing, plan.creases)
-            return attempt(finer(plan.spacing)[0], sharp, field, lattice, plan, settings), words, place
-        except FailedAttemptError as error:
-            failure = error if failure is None or failure.vertex < 0 else failure
+        for _ in range(1 + _RETRIES * (creased and plan.creases and plan.align)):
+            number += 1
+            try:
+                field, sharp = graph(plan.spacing, plan.smoothing, plan.creases), creases(plan.spacing, plan.creases)
+                triangles = finer(plan.spacing, plan.creases)[0]
+                return attempt(triangles, sharp, field, lattice, plan, settings), _in_words(plan, words), place
+            except FailedAttemptError as error:
+                failure = error if failure is None or failure.vertex < 0 else failure
+                if error.place is None:
+                    break
+                plan = replace(plan, apart=np.concatenate([plan.apart, error.place[None]]))
     assert failure is not None
     raise NoMeshError(_refusal(failure, number), failure.vertex)
 
 
-def plans(spacing: float, smoothing: float, settings: MeshingSettings, creased: bool) -> Iterator[tuple[Plan, str]]:
+def _in_words(plan: Plan, words: str) -> str:
+    places = ", ".join(f"({x:.3g}, {y:.3g}, {z:.3g})" for x, y, z in plan.apart)
+    return ", ".join(filter(None, [words, f"creases not aligned near {places}" if places else ""]))
+
+
+def plans(
+    spacing: float, smoothing: float, settings: MeshingSettings, creased: bool = False
+) -> Iterator[tuple[Plan, str]]:
     """What is tried, and how that differs from what was asked for; without the creases at last, where there are any."""
-    can_align = settings.align_boundary or creased
-    for scale in _SPACINGS:
-        for smoother in _SMOOTHER:
-            for align in (True, False) if can_align else (False,):
-                plan = Plan(spacing * scale, spacing * smoothing * smoother, align)
-                words = [
-                    f"directions smoothed over {smoothing * smoother:g} edges" if smoother != 1 else "",
-                    f"{'boundary and creases' if creased else 'boundary'} not aligned"
-                    if can_align and not align
-                    else "",
-                    f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces" if scale != 1 else "",
-                ]
-                yield plan, ", ".join(filter(None, words))
-    if creased:
-        yield Plan(spacing, spacing * smoothing, settings.align_boundary, creases=False), "creases not kept"
+    for kept in (True, False) if creased else (False,):
+        can_align = settings.align_boundary or kept
+        curves = "boundary and creases" if kept else "boundary"
+        for scale in _SPACINGS:
+            for smoother in _SMOOTHER:
+                for align in (True, False) if can_align else (False,):
+                    words = [
+                        "creases not kept" if creased and not kept else "",
+                        f"directions smoothed over {smoothing * smoother:g} edges" if smoother != 1 else "",
+                        f"{curves} not aligned" if can_align and not align else "",
+                        f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces" if scale != 1 else "",
+                    ]
+                    plan = Plan(spacing * scale, spacing * smoothing * smoother, align, kept)
+                    yield plan, ", ".join(filter(None, words))
 
 
 def _refusal(failure: FailedAttemptError, number: int) -> str:

@@ -74,7 +74,7 @@ def principal_quads(
     lattices = [SQUARES] * len(surface.parts)
 
     def sizing(at: float) -> CurvatureSizes:
-        return curvature_sizes(surface.frames, surface.directions, at, chosen.spacing_range)
+        return curvature_sizes(surface.smooth_frames, surface.directions, at, chosen.spacing_range)
 
     laid = replace(surface, sizing=sizing) if chosen.adaptive else surface
     pieces, size = mesh_to_count(laid, lattices, size, chosen, count, lambda made: len(made.faces))

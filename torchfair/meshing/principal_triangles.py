@@ -69,8 +69,9 @@ def principal_triangles(
     across = rows_across(surface.frames, surface.directions)
 
     def sizing(at: float) -> CurvatureSizes:
-        sizes = curvature_sizes(surface.frames, surface.directions, at, chosen.spacing_range, isotropic=True)
-        field = row_sizes(sizes.field, surface.frames, surface.directions, across, ratio, at)
+        frames = surface.smooth_frames
+        sizes = curvature_sizes(frames, surface.directions, at, chosen.spacing_range, isotropic=True)
+        field = row_sizes(sizes.field, frames, surface.directions, across, ratio, at)
         return CurvatureSizes(field, sizes.limited)
 
     laid = replace(

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -58,6 +59,10 @@ class DesignSurface:
         smooth = self.frames.cut_along(self.sharp) if self.sharp.any() else self.frames
         number = rings_for_noise(torch.from_numpy(smooth.points), smooth.topology) if rings == "auto" else rings
         return directions_of(smooth, number), number
+
+    def without_creases(self) -> DesignSurface:
+        """The same as one smooth surface."""
+        return replace(self, sharp=np.zeros_like(self.sharp))
 
     def cut_finer(self, directions: Directions, spacing: float) -> tuple[DesignSurface, Directions]:
         """Triangles fine enough for edges of a length, on the same flat pieces."""

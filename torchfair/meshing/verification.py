@@ -1,12 +1,17 @@
-"""Whether a mesh has the topology of the surface that it was made from."""
+"""Whether a mesh has the topology of the surface that it was made from, and its creases."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from .._graph import count_components
+import numpy as np
+import torch
+
+from .._graph import count_components, edge_numbers
 from ..errors import MeshError
+from ..fields.frames import Ints
 from ..topology import Topology
+from .creases import Creases
 
 
 class Shape(NamedTuple):
@@ -42,3 +47,19 @@ def verified_topology(faces: list[list[int]], num_vertices: int, wanted: Shape) 
     if wrong:
         raise MeshError("the mesh would have " + ", ".join(wrong))
     return topology
+
+
+def verify_creases(topology: Topology, edges: Ints, creases: Creases) -> None:
+    """Checks that edges (C, 2) make the same curves as creases do.
+
+    Raises:
+        MeshError: if they are no edges of a mesh, or make other ones.
+    """
+    if (edge_numbers(topology, torch.from_numpy(edges)) < 0).any():
+        raise MeshError("a crease would not be an edge of the mesh")
+    used, degrees = np.unique(edges, return_counts=True)
+    wanted = creases.degrees[creases.corners]
+    more = sum(not chain.closed for chain in creases.chains) - len(wanted)
+    same = np.array_equal(np.sort(degrees[degrees != 2]), np.sort(wanted[wanted != 2]))
+    if not same or len(edges) - len(used) != more:
+        raise MeshError("creases would not end and meet as they do on the surface")

@@ -29,6 +29,7 @@ def picture_principal_mesh(
     singular_indices: Tensor,
     title: str = "",
     *,
+    creases: Tensor | None = None,
     view: ViewDirection | None = None,
     width: int = 1600,
     overwrite: bool = False,
@@ -45,6 +46,7 @@ def picture_principal_mesh(
         singular_points: ``(n, 3)``, such as of :class:`torchfair.meshing.QuadMesh`.
         singular_indices: ``(n,)`` their indices.
         title: words on top; none by default.
+        creases: ``(n, 2)`` vertices of the edges along creases, which are drawn stronger; none by default.
         view: where to look from; by default :func:`view_direction`.
         width: columns of pixels of the file.
         overwrite: whether an existing file may be replaced.
@@ -71,7 +73,9 @@ def picture_principal_mesh(
     for number, (words, colors) in enumerate(columns):
         left = MARGIN + number * (panel + GAP)
         sheet.caption(words, left, sheet.top, panel)
-        painted = mesh.paint(shade_faces(vertices, topology, camera, colors.to(vertices)), edges=quiet_edges(mesh))
+        painted = mesh.paint(
+            shade_faces(vertices, topology, camera, colors.to(vertices)), edges=quiet_edges(mesh, creases)
+        )
         sheet.image(painted, left, sheet.top + CAPTION)
     scale.draw_bar(sheet, CAPTION + size[0])
     return sheet.write(path, overwrite=overwrite)

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import torch
+from torch import Tensor
 
+from .._graph import edge_numbers
 from ..geometry import face_area_vectors, face_centres
 from .camera import towards_eye
 from .lines import EdgeStyle
 from .render import MeshView
 
+_STRONG, _STRONGEST = 1.6, 2.6  # pixels
 _INK = (0.10, 0.13, 0.19)
 
 
-def quiet_edges(view: MeshView) -> EdgeStyle:
+def quiet_edges(view: MeshView, strong: Tensor | None = None) -> EdgeStyle:
     """Thin dark lines that keep the faces in the foreground: the shorter the edges on the screen, the fainter.
 
-    Boundary edges are drawn stronger.
+    Boundary edges are drawn stronger, and edges between vertices ``strong`` (n, 2) still stronger.
     """
     topology = view.topology
     widths = torch.full((topology.num_edges,), line_width(view, 0.05, 0.35, 1.0), device=view.points.device)
-    widths[topology.num_interior_edges :] = 1.6
+    widths[topology.num_interior_edges :] = _STRONG
+    if strong is not None:
+        widths[edge_numbers(topology, strong)] = _STRONGEST
     return EdgeStyle(torch.tensor(_INK), widths, opacity=0.55)
 
 

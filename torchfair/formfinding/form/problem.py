@@ -186,7 +186,13 @@ class FormProblem:
         return float(corner_angles(vertices, self.topology).min())
 
     def steepest(self, start: Tensor) -> float:
-        """Largest dihedral angle, radians, that is no fold from this start."""
+        """Largest dihedral angle, radians, to which steps may fold an edge from this start.
+
+        Any where no handle pulls: a surface that folds then is given other faces if they may be replaced, and ends
+        lower than one that is held at an angle.
+        """
+        if not bool(self.pulls.pulled.any()):
+            return math.pi
         angles = dihedral_angles(start, self.topology).abs()
         return max(math.radians(LARGEST_DIHEDRAL), float(angles.max()) if angles.numel() else 0.0)
 

@@ -30,6 +30,9 @@ _PULLED = 0.1  # mean edge lengths from which on handles may be to blame where c
 _MORE_MARGIN = 1.6  # from round to round
 _PATIENT_ROUNDS = 2  # before stars that stay wrong are to be something else
 _LESS_PULL = 0.2
+_SLIDING = 0.1  # of fairness of the displacement, which keeps lattices from turning into the directions
+_MORE_WEIGHT = 2.0  # of closeness or E from round to round, where the shape is kept
+_MOST_WEIGHT = 32.0
 _FEW = 0.01  # share of stars with wrong sides that a wider margin may mend
 
 
@@ -37,7 +40,8 @@ class SymmetricPlan(Plan):
     """Rounds until conditions and saddle sides are right; a start that is, with handles in place, is only made exact.
 
     Where conditions cannot be met, the next round begins at the start again with handles that pull less: they yield. A
-    few saddle sides that come out wrong are tried again with a wider margin. The best state found is kept.
+    few saddle sides that come out wrong are tried again with a wider margin. Where the shape is kept and has come too
+    far from its start, or E/C has risen, the next rounds weigh that more. The best state found is kept.
 
     Args:
         problem: Terms and guards.
@@ -62,12 +66,17 @@ class SymmetricPlan(Plan):
         start, pulled = self.state, self._farthest() > _PULLED
         problem.sides.margin = problem.settings.saddle_margin
         problem.sides.forget()
+        problem.rigidity = problem.stiffness = problem.smoothness = 1.0
         for attempt in range(self._rounds):
             self._unscored = True
             yield from self._round(first=attempt == 0)
             found = self._note_score()
             if self._is_right(found) or not self._steps_left:
                 return
+            if found[:2] == (problem.settings.tolerance, 0):
+                if not self._rebalance():
+                    return
+                continue
             many = attempt > 0 and found.wrong > _FEW * problem.stars.vertices.shape[0]
             if pulled and (many or found.residual > problem.settings.tolerance):
                 self.state = start
@@ -136,7 +145,19 @@ class SymmetricPlan(Plan):
         return self._problem.pulls.farthest(self.state["vertices"])
 
     def _is_right(self, found: Score | None = None) -> bool:
-        return (found or self._score()) == (self._problem.settings.tolerance, 0)
+        return (found or self._score()) == (self._problem.settings.tolerance, 0, 0.0)
+
+    def _rebalance(self) -> bool:
+        """Lets vertices slide, then weighs more what was missed of the shape; False where all that has been tried."""
+        problem, missed = self._problem, self._problem.missed(self.state["vertices"])
+        if problem.rigidity == 1.0:
+            problem.rigidity = _SLIDING
+            return True
+        if missed.distance > 0.0:
+            problem.stiffness *= _MORE_WEIGHT
+        if missed.energy > 0.0:
+            problem.smoothness *= _MORE_WEIGHT
+        return max(problem.stiffness, problem.smoothness) <= _MOST_WEIGHT
 
     def _score(self) -> Score:
         return score(self.state["vertices"], self._problem)

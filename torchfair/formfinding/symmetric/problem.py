@@ -21,7 +21,7 @@ from ...projection.layout import State
 from ..face_guard import FaceGuard
 from ..job.plan import Stage
 from ..job.pulls import Pulls
-from .kept_shape import KeptShape
+from .kept_shape import KeptShape, Missed
 from .settings import SymmetricSettings
 
 _SAFE_ANGLE = 2.5  # smallest angles at which the barrier sets in
@@ -53,6 +53,9 @@ class SymmetricProblem:
 
     Attributes:
         sides: What stars are to be; see :class:`~torchfair.constraints.saddle_sides.SaddleSides`.
+        rigidity: Factor of the weight of fairness of the displacement where the shape is kept: small, vertices slide.
+        stiffness: Factor of the weight of closeness to the shape that is kept.
+        smoothness: Factor of the weight of E beside it.
         steered: Whether a handle has ever asked for another shape; without, that of the base is kept.
     """
 
@@ -71,6 +74,7 @@ class SymmetricProblem:
         self.edges = c.between_stars(self.topology.edges[principal.mask], stars)
         self.sides = SaddleSides(stars, margin=settings.saddle_margin)
         self._reference, self.steered = reference, False
+        self.rigidity = self.stiffness = self.smoothness = 1.0
         self.forget()
         self._angles = corner_angles(base, self.topology)
         self._smallest_angle = min(settings.smallest_angle, 0.8 * float(self._angles.min()))
@@ -85,6 +89,10 @@ class SymmetricProblem:
     def has_other_goals(self) -> bool:
         """Whether more is asked for than conditions and handles: closeness to another surface, or E."""
         return self._reference is not None or self.settings.energy_weight > 0.0
+
+    def missed(self, vertices: Tensor) -> Missed:
+        """How far vertices (V, 3) are from what is promised of a shape that is kept; nothing if it is not."""
+        return self._kept_shape().missed(vertices) if self.keeps_shape else Missed()
 
     def pull_fully(self) -> None:
         """Aims at the targets of handles themselves, with their full weight."""
@@ -105,6 +113,11 @@ class SymmetricProblem:
         self._planes = None if self._reference is None else c.TangentPlanes(self._reference)
         self._shape: KeptShape | None = None
         self._kept: dict[tuple[object, SymmetricSettings], list[ElementTerm]] = {}
+
+    def _kept_shape(self) -> KeptShape:
+        if self._shape is None:
+            self._shape = KeptShape(self.base, self.topology)
+        return self._shape
 
     # ---- stages ----------------------------------------------------------------------------------------
 
@@ -129,7 +142,7 @@ class SymmetricProblem:
 
     @property
     def _energy_weight(self) -> float:
-        least = _KEPT_ENERGY * self.settings.shape_weight if self.keeps_shape else 0.0
+        least = self.smoothness * _KEPT_ENERGY * self.settings.shape_weight if self.keeps_shape else 0.0
         return max(self.settings.energy_weight, least)
 
     def stage(self, state: State, aim: Aim, settings: ProjectionSettings) -> Stage:
@@ -143,7 +156,7 @@ class SymmetricProblem:
             name=name,
             blocks=state,
             terms=lambda: self.terms(aim),
-            version=(aim, self.settings, self.keeps_shape),
+            version=(aim, self.settings, self.keeps_shape, self.rigidity, self.stiffness, self.smoothness),
             settings=replace(settings, solver=self.settings.projection.solver),
             fixed={"vertices": self.stays | self.pulls.held},
             guard=self.admits,
@@ -162,7 +175,10 @@ class SymmetricProblem:
             return conditions
         if aim is Aim.EXACT:
             return [*conditions, *self._sides(share=_KEPT_MARGIN)]
-        others = [*self._energy(weight), *self._same(("others", self.keeps_shape), self._others)]
+        others = [
+            *self._energy(weight),
+            *self._same(("others", self.keeps_shape, self.rigidity, self.stiffness), self._others),
+        ]
         return [*conditions, *self._sides(ahead=aim is not Aim.SEARCH), *others]
 
     def _same(self, name: object, make: Callable[[], list[ElementTerm]]) -> list[ElementTerm]:
@@ -189,7 +205,7 @@ class SymmetricProblem:
         ]
 
     def _fairness(self) -> list[ElementTerm]:
-        weight = self.settings.fairness_weight
+        weight = self.settings.fairness_weight * (self.rigidity if self.keeps_shape else 1.0)
         if self.settings.second_differences:
             return c.polyline_fairness_terms(self.topology, weight=weight)
         return c.displacement_fairness_terms(self.base, self.topology, weight=weight)
@@ -206,8 +222,7 @@ class SymmetricProblem:
 
     def _closeness(self) -> list[ElementTerm]:
         if self.keeps_shape:
-            self._shape = self._shape or KeptShape(self.base, self.topology)
-            return self._shape.terms(weight=self.settings.shape_weight)
+            return self._kept_shape().terms(weight=self.stiffness * self.settings.shape_weight)
         if self._planes is None:
             return []
         every = torch.arange(self.topology.num_vertices)

@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping
 
 from ..job.promises import Promise, handle_promise
+from .kept_shape import LARGEST_DISTANCE, MORE_ENERGY
 from .settings import SymmetricSettings
 
-_LARGEST_DISTANCE = 0.1  # mean edges
-_MORE_ENERGY = 1.01
 _LEAST_AREA = 0.9  # of that of the mesh that was given, where the shape is kept
 _LEAST_FREE_AREA = 0.5  # where it is free; below, the mesh has begun to collapse
 _OF_GIVEN = " over that of the mesh that was given"
@@ -72,13 +71,16 @@ def _of_kept_shapes(
     given = first or before
     away = after["largest_distance_from_start"]
     name = f"distance from the mesh {'that was given' if first is None else 'of this level before it was solved'}"
-    of_edges = "choose principal edges that follow principal directions better, remesh along these, or free the shape"
-    promises = [Promise(name, _LARGEST_DISTANCE, away, unit="mean edges", remedy=of_edges)]
+    of_edges = (
+        "choose principal edges that follow principal directions better, remesh along these (torchfair mesh "
+        "--triangles), or free the shape"
+    )
+    promises = [Promise(name, LARGEST_DISTANCE, away, unit="mean edges", remedy=of_edges)]
     promises.append(_of_area(_LEAST_AREA, given, after, "refine less, or start from a finer mesh"))
     largest, words = given["energy_over_curvature"], _OF_GIVEN
     if before["energy_over_curvature"] > largest:  # refinement alone raises it where edges are long
         largest, words = before["energy_over_curvature"], f"{_OF_GIVEN}, refined"
     if math.isfinite(largest):
         ratio = after["energy_over_curvature"] / largest
-        promises.append(Promise(f"E/C{words}", _MORE_ENERGY, ratio, remedy=of_edges))
+        promises.append(Promise(f"E/C{words}", MORE_ENERGY, ratio, remedy=of_edges))
     return promises

@@ -18,16 +18,19 @@ class Score(NamedTuple):
     Attributes:
         residual: Largest relative residual of the conditions, not below the tolerance.
         wrong: Stars of negative curvature with principal neighbours on the wrong side, or with a crossing pyramid.
+        missed: The larger share by which a bound of the shape that is kept is exceeded.
     """
 
     residual: float
     wrong: int
+    missed: float = 0.0
 
 
 def score(vertices: Tensor, problem: SymmetricProblem) -> Score:
     """Of normalised vertices (V, 3)."""
     residual = largest_residual(vertices, problem)
-    return Score(max(residual, problem.settings.tolerance), _count_wrong(vertices, problem))
+    missed = max(problem.missed(vertices))
+    return Score(max(residual, problem.settings.tolerance), _count_wrong(vertices, problem), missed)
 
 
 def largest_residual(vertices: Tensor, problem: SymmetricProblem) -> float:

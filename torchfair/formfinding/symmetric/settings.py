@@ -49,7 +49,8 @@ class SymmetricSettings:
             kept otherwise: vertices stay close to the surface they start on, those of the boundary to curves. Live
             sessions are free in any case.
         shape_weight: Weight of half the squared distance from the shape that is kept. E counts at least a hundredth
-            of that then, which keeps stars that slide fair.
+            of that then, which keeps stars that slide fair. Where the result is too far from its start, or E/C has
+            risen, fairness counts a tenth, and what was missed more and more.
         energy_weight: Weight of E, which counts once; 0 without.
         energy_smoothing: ``l l*`` below this is treated as flat.
         saddle_weight: Weight of half the squares by which saddle sides are missed.

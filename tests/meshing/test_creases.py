@@ -1,0 +1,229 @@
+"""Creases of a surface: found, kept as lines or as cuts, and what each step does about them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from creased_shapes import box, can, drilled_box, fading_fold, folded_sheet, pyramid, tunnel_on_a_plane
+from helpers import grid_faces, random_rotation
+from meshing_tools import irregular
+
+from torchfair import MeshError, Topology
+from torchfair._graph import connected
+from torchfair.creases import crease_edges
+from torchfair.fields import FaceFrames
+from torchfair.geometry import dihedral_angles, face_areas
+from torchfair.meshing import MeshingSettings, QuadMesh, principal_quads
+from torchfair.meshing.bridges import cut_bridges
+from torchfair.meshing.creases import find_creases, sharp_edges
+from torchfair.meshing.mesh_creases import MeshCreases
+from torchfair.meshing.polygon_edits import PolygonEdits
+from torchfair.meshing.surface import components_of
+from torchfair.meshing.verification import shape_of, verify_creases
+from torchfair.shapes import PrincipalParaboloid, Torus
+
+SHARP = math.radians(40)
+SHAPES = {
+    "box": box(),
+    "plate with a hole": drilled_box(),
+    "can": can(),
+    "can with a leaning lid": can(0.7),
+    "folded sheet": folded_sheet(),
+    "tunnel": tunnel_on_a_plane(),
+    "pyramid": pyramid(),
+    "fading fold": fading_fold(),
+}
+SLOW = {"plate with a hole", "can", "tunnel"}
+NOT_ALL_LINES = {"can with a leaning lid", "pyramid", "fading fold"}
+
+
+def is_crease(mesh: QuadMesh) -> np.ndarray:
+    """(I,) inner edges along creases."""
+    known = {tuple(pair) for pair in mesh.creases.edges.tolist()}
+    return np.array([tuple(sorted(pair)) in known for pair in mesh.topology.interior_edges.tolist()])
+
+
+def parts(topology: Topology, crease: np.ndarray) -> int:
+    """How many pieces a surface falls into where it is cut along creases."""
+    return int(connected(topology.interior_edge_faces.numpy()[~crease], topology.num_faces).max()) + 1
+
+
+def points_to(segments: torch.Tensor, point: torch.Tensor) -> float:
+    """Distance of a point from segments."""
+    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    place = (((point - start) * along).sum(1) / along.square().sum(1)).clamp(0, 1)
+    return float((point - start - place[:, None] * along).norm(dim=1).min())
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in SHAPES])
+def test_creases_of_the_surface_are_edges_of_the_mesh(name: str) -> None:
+    vertices, topology = SHAPES[name]
+    found = principal_quads(vertices, topology, count=500 if name == "plate with a hole" else 150)
+    assert found.notes == []
+    assert shape_of(found.topology) == shape_of(topology)
+    made = found.vertices[found.creases.edges]
+    off = max(points_to(found.creases.given, end) for end in made.reshape(-1, 3))
+    assert off < 1e-9 * found.report["mean_edge"]
+    sharp = np.zeros(topology.num_interior_edges, bool)
+    sharp[crease_edges(vertices, topology, SHARP)] = True
+    crease = is_crease(found)
+    assert crease.sum() == len(found.creases.edges) == found.report["crease_edges"] > 0
+    assert parts(found.topology, crease) == parts(topology, sharp)  # no face lies on both sides of a crease
+    frames = FaceFrames.of(vertices, topology)
+    wanted = find_creases(frames, sharp, SHARP, 0.0)
+    corners = vertices[torch.from_numpy(wanted.corners)]
+    assert all(float((found.vertices - corner).norm(dim=1).min()) < 1e-12 for corner in corners)
+    lengths = [float((x[:, 1] - x[:, 0]).norm(dim=1).sum()) for x in (made, found.creases.given)]
+    assert lengths[0] == pytest.approx(lengths[1], rel=0.04)
+    assert found.topology.is_quadrangular == (name not in NOT_ALL_LINES)
+
+
+def test_a_box_has_its_corners_and_edges_wherever_it_is() -> None:
+    vertices, topology = box()
+    turned = vertices @ random_rotation(3).T * 1e3 + 500
+    for points in (vertices, turned):
+        found = principal_quads(points, topology, count=150)
+        assert found.report["singular"] == {"0.25": 8}
+        assert found.report["faces"] == 150
+        angles = dihedral_angles(found.vertices, found.topology).abs().numpy()
+        assert np.abs(angles[is_crease(found)] - math.pi / 2).max() < 1e-6
+        assert angles[~is_crease(found)].max() < 1e-6
+        assert found.report["crease_distance_max"] < 1e-9
+        assert float(face_areas(found.vertices, found.topology).sum()) == pytest.approx(
+            float(face_areas(points, topology).sum())
+        )
+
+
+def test_a_cube_of_twelve_triangles_can_be_six_quads() -> None:
+    found = principal_quads(*box(2), count=6)
+    assert found.topology.num_faces == 6
+    assert found.topology.is_quadrangular
+    assert len(found.creases.edges) == 12
+
+
+def test_an_angle_of_zero_and_smooth_surfaces_have_no_creases() -> None:
+    assert not components_of(*folded_sheet(), 0.0)[0].sharp.any()
+    assert components_of(*folded_sheet(), SHARP)[0].sharp.any()
+    smooth = irregular(Torus(), 800)
+    assert not sharp_edges(*smooth, MeshingSettings().crease_angle).any()
+    found = principal_quads(*smooth, count=200)
+    assert (found.report["crease_edges"], found.report["crease_distance_max"]) == (0, 0)
+
+
+def test_noise_is_no_crease() -> None:
+    vertices, topology = irregular(PrincipalParaboloid(1.0, -0.5, (0.8, 0.8)), 700)
+    shift = torch.randn(vertices.shape, generator=torch.Generator().manual_seed(0), dtype=vertices.dtype)
+    rough = vertices + 0.015 * shift
+    assert len(crease_edges(rough, topology, SHARP)) > 20
+    assert not sharp_edges(rough, topology, SHARP).any()
+    assert sharp_edges(*fading_fold(), SHARP).any()  # its two loose ends are none of noise
+
+
+def test_chains_end_at_corners() -> None:
+    vertices, topology = box(4)
+    frames = FaceFrames.of(vertices, topology)
+    found = find_creases(frames, sharp_edges(vertices, topology, SHARP), SHARP, 0.0)
+    assert (len(found.chains), int(found.corners.sum())) == (12, 8)
+    for chain in found.chains:
+        assert not chain.closed
+        ends = np.stack([chain.vertices[:-1], chain.vertices[1:]], 1)
+        assert np.array_equal(np.sort(frames.edges[chain.edges], 1), np.sort(ends, 1))
+        forward = chain.forward(frames)
+        assert np.array_equal(frames.edges[chain.edges, (~forward).astype(int)], chain.vertices[:-1])
+    vertices, topology = can()
+    found = find_creases(FaceFrames.of(vertices, topology), sharp_edges(vertices, topology, SHARP), SHARP, 0.0)
+    assert [chain.closed for chain in found.chains] == [True, True]
+    vertices, topology = fading_fold()
+    frames, sharp = FaceFrames.of(vertices, topology), sharp_edges(vertices, topology, SHARP)
+    assert len(find_creases(frames, sharp, SHARP, 0.1).chains) == 1
+    assert len(find_creases(frames, sharp, SHARP, 10.0).chains) == 0  # shorter than an edge of the new mesh
+
+
+def test_curvature_does_not_reach_across() -> None:
+    """A tunnel of radius 1/2 that rises from a plane: curvatures 2 and 0, up to the crease."""
+    (surface,) = components_of(*tunnel_on_a_plane(), SHARP)
+    directions, rings = surface.directions("auto")
+    assert rings == 2
+    flat = np.abs(surface.frames.normals[:, 2]) > 1 - 1e-9
+    flat &= np.abs(surface.frames.centres[:, 0]) > 0.5
+    assert np.abs(directions.values[flat]).max() < 1e-6
+    assert np.abs(np.abs(directions.values[~flat]) - 1).max() < 0.1
+    across, _ = surface.without_creases().directions("auto")
+    assert np.abs(across.values[flat]).max() > 0.3
+
+
+def test_no_triangle_has_all_its_corners_on_creases() -> None:
+    for vertices, topology in (box(2), can(around=16)):
+        sharp = sharp_edges(vertices, topology, SHARP)
+        points, finer, kept = cut_bridges(vertices, topology, sharp)
+        assert shape_of(finer) == shape_of(topology)
+        assert kept.sum() == sharp.sum()
+        assert float(face_areas(points, finer).sum()) == pytest.approx(float(face_areas(vertices, topology).sum()))
+        on_crease = np.zeros(len(points), bool)
+        on_crease[finer.interior_edges.numpy()[kept]] = True
+        inner = finer.interior_edges.numpy()[~kept]
+        assert not on_crease[inner].all(1).any()
+        assert torch.equal(points[: len(vertices)], vertices)
+    plain = irregular(Torus(), 300)
+    assert cut_bridges(*plain, np.zeros(plain[1].num_interior_edges, bool))[1] is plain[1]
+
+
+def strip() -> PolygonEdits:
+    """Three columns of four quads with a crease between the second and the third row of vertices."""
+    x, y = np.meshgrid(np.arange(5), np.arange(4), indexing="ij")
+    positions = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1).astype(float)
+    outer = (x == 0) | (y == 0) | (x == 4) | (y == 3)
+    line = np.arange(5) * 4 + 1
+    creases = np.stack([line[:-1], line[1:]], 1)
+    fixed = np.zeros(20, bool)
+    fixed[line[[0, -1]]] = True
+    return PolygonEdits(positions, grid_faces(5, 4).tolist(), outer.ravel(), fixed, creases)
+
+
+def test_edges_collapse_along_creases_and_onto_them_only() -> None:
+    edits = strip()
+    assert edits.collapse((5, 9))
+    assert sum(map(len, edits.beside.values())) == 2 * 3
+    assert not edits.collapse((4, edits.place_of(5)))  # from the crease to the boundary
+    assert edits.collapse((14, 13))
+    assert 14 not in edits.around
+    assert 13 in edits.around
+    edits = strip()
+    assert edits.collapse((1, 5))
+    assert edits.place_of(5) == 1
+    assert edits.beside[1] == {9}
+    assert edits.beside[9] == {1, 13}
+
+
+def test_faces_are_not_merged_across_creases() -> None:
+    edits = strip()
+    number = next(n for n, face in edits.faces.items() if {5, 9, 4, 8} == set(face))
+    crease = next(edge for edge in edits.sides(number) if set(edge) == {5, 9})
+    assert edits.across(crease, number) is not None
+    assert not edits.merge(number, crease)
+    other = next(edge for edge in edits.sides(number) if set(edge) == {8, 9})
+    assert edits.merge(number, other)
+
+
+def test_verification_of_creases() -> None:
+    vertices, topology = box(4)
+    wanted = find_creases(FaceFrames.of(vertices, topology), sharp_edges(vertices, topology, SHARP), SHARP, 0.0)
+    edges = np.sort(topology.interior_edges.numpy()[wanted.edges], axis=1)
+    verify_creases(topology, edges, wanted)
+    with pytest.raises(MeshError, match="end and meet"):
+        verify_creases(topology, edges[1:], wanted)
+    far = np.array([[0, topology.num_vertices - 1]])
+    with pytest.raises(MeshError, match="not be an edge"):
+        verify_creases(topology, np.concatenate([edges, far]), wanted)
+
+
+def test_distances_are_measured_both_ways() -> None:
+    given = torch.tensor([[[0.0, 0, 0], [1, 0, 0]], [[1, 0, 0], [3, 0, 0]]])
+    vertices = torch.tensor([[0.0, 0, 0], [1, 0.5, 0], [2, 0, 0]])
+    assert MeshCreases(torch.tensor([[0, 1], [1, 2]]), given).distance(vertices) == pytest.approx(1.0)  # the end at 3
+    assert MeshCreases(torch.tensor([[0, 1], [1, 2]]), given[:1]).distance(vertices) == pytest.approx(1.0)
+
+    assert MeshCreases(torch.zeros((0, 2), dtype=torch.int64), given).distance(vertices) == 0.0
