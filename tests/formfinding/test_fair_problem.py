@@ -106,7 +106,7 @@ def test_auxiliary_variables_fit_their_constraints_at_every_start_of_a_stage() -
 def test_a_single_face_without_area_is_refused() -> None:
     vertices = torch.tensor([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0]], dtype=DOUBLE)
     topology = Topology.from_faces([[0, 1, 2], [1, 0, 3]])
-    with pytest.raises(MeshError, match=r"1 face\(s\) have no area: faces \[1\]"):
+    with pytest.raises(MeshError, match=r"1 face\(s\) have no area: faces 1\b"):
         minimise_normal_variation(vertices, topology)
 
 

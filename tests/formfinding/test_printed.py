@@ -219,7 +219,7 @@ def test_panels_are_kept_flat_as_the_paper_says_in_one_run() -> None:
     assert len(kept.runs) == 1
     assert "edges between coplanar triangles are kept flat" in " ".join(kept.notes)
     problem = FairRecipe(*mesh, settings=settings).problem
-    folds = [float(problem.folds(problem_unit(result, mesh)).mean()) for result in (kept, free)]
+    folds = [float(problem.panels.folds(problem_unit(result, mesh)).mean()) for result in (kept, free)]
     assert folds[0] < 0.3 * folds[1]
 
 

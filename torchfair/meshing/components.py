@@ -59,13 +59,9 @@ class ReadSurface:
 
     def curved(self, points: Tensor) -> Tensor:
         """Points on the triangles, moved onto a smooth surface through their vertices, smooth but for creases."""
-        apart = [part.frames.cut_along(part.sharp) if part.sharp.any() else part.frames for part in self.parts]
-        fits = [
-            fitted_curvature(torch.from_numpy(of.points), of.topology, rings=rings)
-            for of, rings in zip(apart, self.rings, strict=True)
-        ]
+        smooth, rings = self.smooth_frames, zip(self._smooth_parts, self.rings, strict=True)
+        fits = [fitted_curvature(torch.from_numpy(of.points), of.topology, rings=many) for of, many in rings]
         normals, operators = torch.cat([of.normals for of in fits]), torch.cat([of.operators for of in fits])
-        smooth = self.smooth_frames
         return on_curved_surface(points, torch.from_numpy(smooth.points), smooth.topology, normals, operators)
 
     @cached_property
@@ -78,8 +74,11 @@ class ReadSurface:
         """Of all components, with triangles apart from each other along creases."""
         if not any(part.sharp.any() for part in self.parts):
             return self.frames
-        apart = [part.frames.cut_along(part.sharp) for part in self.parts]
-        return FaceFrames.of(*_together([(torch.from_numpy(of.points), of.topology) for of in apart]))
+        return FaceFrames.of(*_together([(torch.from_numpy(of.points), of.topology) for of in self._smooth_parts]))
+
+    @cached_property
+    def _smooth_parts(self) -> list[FaceFrames]:
+        return [part.frames.cut_along(part.sharp) if part.sharp.any() else part.frames for part in self.parts]
 
     @cached_property
     def directions(self) -> Directions:

@@ -16,7 +16,8 @@ from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
 from ..job.promises import Promise, handle_promise
 from .panel_sizes import own_sizes
-from .problem import PLANAR_PROMISE, FairProblem
+from .panels import PLANAR_PROMISE
+from .problem import FairProblem
 
 _EDGES = "mean edges"
 _KEPT_AREA = 0.9  # of that of a sheet with a free boundary
@@ -73,10 +74,10 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "largest_area_ratio": float(ratios.max()),
         "largest_growth": float(growth.max()),
         "flipped_faces": int((turned <= 0.0).sum()),
-        "largest_planarity": _largest(warps[problem.planar_faces]),
+        "largest_planarity": _largest(warps[problem.panels.planar]),
         "largest_planarity_of_all": _largest(warps[topology.face_sizes > 3]),
-        "largest_planarity_growth": max(0.0, _largest(problem.nearly_planar.growth(vertices, topology))),
-        "largest_fold_degrees": math.degrees(_largest(problem.folds(vertices))),
+        "largest_planarity_growth": max(0.0, _largest(problem.panels.growth(vertices))),
+        "largest_fold_degrees": math.degrees(_largest(problem.panels.folds(vertices))),
         "largest_handle_distance": unit.length * _largest(problem.pulls.away(normalised)),
     }
 
@@ -113,14 +114,14 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         growth, remedy = after["largest_growth"], "raise largest_area, or allow smaller areas"
         promises.append(Promise("growth of a face, by", settings.largest_area, growth, remedy=remedy))
     promises.append(Promise("faces turned over", 0.0, after["flipped_faces"], remedy="pull less, or in several steps"))
-    if problem.planar_faces.numel() and settings.planarity_weight:
+    if problem.panels.planar.numel() and settings.planarity_weight:
         promises.append(Promise(_OF_PANELS, PLANAR_PROMISE, after["largest_planarity"], remedy=_FREER))
-    if problem.nearly_planar.faces.numel():
+    if problem.panels.nearly.faces.numel():
         growth = after["largest_planarity_growth"]
         promises.append(
             Promise("growth of the planarity of nearly planar faces", PLANAR_PROMISE, growth, remedy=_FREER)
         )
-    if problem.flat_edges.numel() and settings.flat_weight:
+    if problem.panels.flat.numel() and settings.flat_weight:
         remedy = "let the boundary glide or be free, raise distance_limit, or let them fold: flat none"
         reached = after["largest_fold_degrees"]
         promises.append(Promise("folds of edges kept flat", FLAT_PROMISE, reached, unit="degrees", remedy=remedy))
@@ -133,10 +134,10 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
 
 def located(promises: Sequence[Promise], vertices: Tensor, problem: FairProblem) -> list[Promise]:
     """The promises, with the panels of ``vertices`` (V, 3) named that are not planar as promised, the worst first."""
-    warps = planarity(vertices, problem.topology)[problem.planar_faces]
+    warps = problem.panels.warps(vertices)
     order = torch.argsort(warps, descending=True, stable=True)[: int((warps > PLANAR_PROMISE).sum())]
     named = [
-        f"{face} ({warp:.2g})" for face, warp in zip(problem.planar_faces[order[:5]], warps[order[:5]], strict=True)
+        f"{face} ({warp:.2g})" for face, warp in zip(problem.panels.planar[order[:5]], warps[order[:5]], strict=True)
     ]
     where = f"{len(order)} of {len(warps)}, counted from 0: {', '.join(named)}" + ", ..." * (len(order) > 5)
     return [replace(p, where=where) if p.name == _OF_PANELS and len(order) else p for p in promises]

@@ -9,7 +9,8 @@ from torch import Tensor
 
 from ...projection.layout import State
 from ..job.plan import Plan, Stages
-from .problem import PLANAR_PROMISE, FairProblem
+from .panels import PLANAR_PROMISE
+from .problem import FairProblem
 
 _SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
 _LARGEST_SHARE = 1.3
@@ -56,7 +57,7 @@ class FairPlan(Plan):
         problem.most_warped = math.inf
         energy, warp = problem.energy(start), problem.largest_warp(start)
         yield from self._lowered(self.planned(), start, _LARGEST_SHARE if not every else 1.0)
-        if every or not problem.makes_planar:
+        if every or not problem.panels.makes_planar:
             return
         first = self.state["vertices"]
         if problem.largest_warp(first) <= PLANAR_PROMISE and problem.energy(first) <= energy:
@@ -84,7 +85,7 @@ class FairPlan(Plan):
             settings = problem.settings.stage() if portions else problem.settings.projection
             yield problem.stage(self.state, share, blur, settings)
             self.state = problem.blocks(self.state["vertices"])
-            if not portions and share < most and not problem.is_planar(problem.placed(self.state)):
+            if not portions and share < most and not problem.panels.are_planar(problem.placed(self.state)):
                 portions.append(Portion(share + _SHARE_STEP, 1.0))
 
     def _made_planar(self, start: Tensor) -> Stages:
@@ -97,7 +98,7 @@ class FairPlan(Plan):
         for share in _PLANAR_SHARES:
             yield problem.planar_stage(self.state, share)
             self.state = problem.blocks(self.state["vertices"])
-            if problem.is_planar(problem.placed(self.state)):
+            if problem.panels.are_planar(problem.placed(self.state)):
                 break
         planar = self.state["vertices"]
         if problem.largest_warp(planar) > PLANAR_PROMISE:

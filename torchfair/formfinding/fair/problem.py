@@ -11,8 +11,7 @@ import torch
 from torch import Tensor
 
 from ... import constraints as c
-from ...geometry import corner_angles, dihedral_angles, face_areas
-from ...geometry.planarity import planarity
+from ...geometry import corner_angles, face_areas
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...topology import Topology
@@ -20,25 +19,19 @@ from ..job.plan import Stage
 from ..job.pulls import Pulls
 from ..references import GivenReference
 from .feature_curves import FeatureCurves
-from .flat_edges import edges_to_keep_flat
 from .free_boundary import FreeBoundary
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
 from .panel_sizes import growth_terms, own_sizes
-from .planar_faces import NearlyPlanar, faces_to_keep_planar
+from .panels import Panels
 from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)
 _LEAST_SAFETY = math.radians(2.0)
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
-_LARGEST_WARP = 1e-2  # relative planarity above which planarity is imposed in stages
 _PLANARITY_STAGES = 8
-PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
-_PLANAR_ENOUGH = 5e-5
 _NEAR = 1.0  # weight of closeness while faces become planar
-_LARGEST_FOLD = math.radians(2.0)  # of edges kept flat, above which that is imposed in stages
-_FLAT_ENOUGH = math.radians(0.01)
 _MOST_STAGES = 20
 
 
@@ -59,10 +52,8 @@ class FairProblem:
         near: Closeness to the reference surface.
         input_edge: Mean edge length of the input.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
-        planar_faces: (n,) faces that are kept planar.
-        nearly_planar: Faces that do not become less planar.
+        panels: Faces that are kept planar and edges that are kept flat.
         loose: (V,) bool, corners of boundary and creases that become planar faces may take along.
-        flat_edges: (n,) interior edges that are kept flat.
         most_warped: Relative planarity that no face may exceed that should be planar but cannot become so.
         distance_for_planarity: How far planar faces may take the mesh from the reference, in mean edges of the input.
         boundary: Curves on which vertices of the boundary and of creases glide; None if none do.
@@ -88,10 +79,8 @@ class FairProblem:
         self.input_edge, self._curves = input_edge, rim or feature_curves(vertices, topology, settings)
         self.corners = self._curves.rim.corners
         self._tell_of_creases()
-        self.planar_faces = self._planar_faces()
-        self.nearly_planar = self._nearly_planar()
+        self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
-        self.flat_edges = self._flat_edges()
         self.boundary = self._gliding_boundary()
         self._free = FreeBoundary(vertices, topology, self._curves, pulls)
         self.most_warped, self.distance_for_planarity = math.inf, 0.0
@@ -147,10 +136,7 @@ class FairProblem:
         """
         pulled = self.pulls.away(vertices)
         steps = math.ceil(float(pulled.max()) / _LONGEST_PULL) if pulled.numel() else 1
-        warped = planarity(vertices, self.topology)[self.planar_faces]
-        folds = self.folds(vertices)
-        warps = warped.numel() and float(warped.max()) > _LARGEST_WARP
-        if warps or (folds.numel() and float(folds.max()) > _LARGEST_FOLD):
+        if self.panels.come_in_stages(vertices):
             steps = max(steps, _PLANARITY_STAGES)
         steps = max(1, min(steps, _MOST_STAGES))
         self.has_other_goals = self.has_other_goals or steps > 1
@@ -172,9 +158,9 @@ class FairProblem:
             *self._fairness(),
             *self._quality(),
             *self.pulls.terms(weight=settings.handle_weight),
-            *c.planarity_terms(self.topology, self.planar_faces, weight=_raised(settings.planarity_weight, share)),
-            *self.nearly_planar.terms(self.topology, weight=_raised(settings.planarity_weight, share)),
-            *self._flat(share),
+            *self.panels.planar_terms(share),
+            *self.panels.nearly_planar_terms(share),
+            *self.panels.flat_terms(share),
             *self._directions(),
         ]
 
@@ -188,8 +174,8 @@ class FairProblem:
             *c.displacement_fairness_terms(self.vertices, self.topology, weight=settings.fairness_weight),
             *self._quality(),
             *self.pulls.terms(weight=settings.handle_weight),
-            *c.planarity_terms(self.topology, self.planar_faces, weight=_raised(settings.planarity_weight, share)),
-            *self._flat(share),
+            *self.panels.planar_terms(share),
+            *self.panels.flat_terms(share),
         ]
 
     def planar_stage(self, state: State, share: float) -> Stage:
@@ -204,25 +190,9 @@ class FairProblem:
             guard=self.admits,
         )
 
-    def is_planar(self, vertices: Tensor) -> bool:
-        """Whether faces kept planar and edges kept flat are well within the tolerances that the job promises."""
-        warped = planarity(vertices, self.topology)[self.planar_faces]
-        settings, folded = self.settings, self.folds(vertices)
-        if settings.planarity_weight and bool((warped > _PLANAR_ENOUGH).any()):
-            return False
-        if bool((self.nearly_planar.growth(vertices, self.topology) > _PLANAR_ENOUGH).any()):
-            return False
-        return not settings.flat_weight or not bool((folded > _FLAT_ENOUGH).any())
-
-    @property
-    def makes_planar(self) -> bool:
-        """Whether faces are asked to be planar that need not be so at the start."""
-        settings = self.settings
-        return settings.planar not in ("keep", "none") and bool(settings.planarity_weight and self.planar_faces.numel())
-
     def largest_warp(self, vertices: Tensor) -> float:
         """Largest relative planarity of the faces kept planar, with gliding ``vertices`` (V, 3) put in place."""
-        warped = planarity(self.placed({"vertices": vertices}), self.topology)[self.planar_faces]
+        warped = self.panels.warps(self.placed({"vertices": vertices}))
         return float(warped.max()) if warped.numel() else 0.0
 
     def energy(self, vertices: Tensor) -> float:
@@ -244,12 +214,6 @@ class FairProblem:
             "distance limit: planar_distance 0 to keep that"
         )
 
-    def folds(self, vertices: Tensor) -> Tensor:
-        """(n,) angles between the normals at the edges kept flat, radians."""
-        if not self.flat_edges.numel():
-            return vertices.new_zeros(0)
-        return dihedral_angles(vertices, self.topology)[self.flat_edges].abs()
-
     def blocks(self, vertices: Tensor) -> dict[str, Tensor]:
         """Variable blocks at ``vertices``; auxiliary variables satisfy their constraints there."""
         if self.settings.formulation == "reduced":
@@ -269,37 +233,13 @@ class FairProblem:
         fixed = kinds[self.settings.boundary] | isolated | (self._curves.corners & ~self.topology.is_boundary_vertex)
         return fixed & ~self.pulls.pulled & ~self.loose
 
-    def _planar_faces(self) -> Tensor:
-        faces = faces_to_keep_planar(self.vertices, self.topology, self.settings)
-        if faces.numel() and isinstance(self.settings.planar, str):
-            words = "are kept planar" if self.settings.planar == "keep" else "are to be planar"
-            self.notes.append(f"{faces.numel()} of {self.topology.num_faces} faces {words}")
-        return faces
-
-    def _nearly_planar(self) -> NearlyPlanar:
-        settings = self.settings
-        found = NearlyPlanar.of(self.vertices, self.topology, settings, self.planar_faces)
-        if not found.faces.numel() or not settings.planarity_weight:
-            return found.none()
-        keeps = settings.planar == "keep"
-        words = "do not become less planar" if keeps else "are let go"
-        self.notes.append(
-            f"{found.faces.numel()} nearly planar faces (within {settings.planar_reach:g}, at most "
-            f"{float(found.most.max()):.2g}) {words}"
-        )
-        return found if keeps else found.none()
-
     def _loose_corners(self) -> Tensor:
         """Those of faces that are to become planar: where all their corners stayed, few could."""
-        settings, topology = self.settings, self.topology
+        settings = self.settings
         corners = self.corners if settings.boundary == "glide" else torch.zeros_like(self.corners)
-        if not self.makes_planar or settings.projection.takes_every_step:
+        if not self.panels.makes_planar or settings.projection.takes_every_step:
             return torch.zeros_like(corners)
-        warped = torch.zeros(topology.num_faces, dtype=torch.bool)
-        chosen = planarity(self.vertices, topology)[self.planar_faces] > settings.planar_tolerance
-        warped[self.planar_faces[chosen]] = True
-        of_warped = torch.zeros_like(corners).index_fill(0, topology.corners[warped[topology.corner_faces]], True)
-        return of_warped & (corners | self._curves.stay)
+        return self.panels.warped_corners(self.vertices) & (corners | self._curves.stay)
 
     def _tell_of_creases(self) -> None:
         count, stay = int((self._curves.edges >= 0).sum()), int(self._curves.stay.sum())
@@ -310,12 +250,6 @@ class FairProblem:
                 f"{stay} corners stay; 0 degrees for no creases"
             )
 
-    def _flat_edges(self) -> Tensor:
-        edges = edges_to_keep_flat(self.vertices, self.topology, self.settings)
-        if edges.numel() and isinstance(self.settings.flat, str):
-            self.notes.append(f"{edges.numel()} edges between coplanar triangles are kept flat")
-        return edges
-
     # ---- terms -----------------------------------------------------------------------------------------
 
     def _energy(self, blur: float) -> list[ElementTerm]:
@@ -324,7 +258,7 @@ class FairProblem:
             smoothing = blur * settings.smoothing
             return c.normal_variation_terms(self.topology, smoothing=smoothing, weight=settings.energy_weight)
         planar = self.topology.face_sizes == 3
-        planar[self.planar_faces] = True
+        planar[self.panels.planar] = True
         return c.lifted_normal_variation_terms(
             self.vertices,
             self.topology,
@@ -332,13 +266,6 @@ class FairProblem:
             weight=settings.energy_weight,
             constraint_weight=settings.constraint_weight,
         )
-
-    def _flat(self, share: float) -> list[ElementTerm]:
-        """By ``l* = 0`` where dual lengths are unknowns, as in the paper."""
-        weight = _raised(self.settings.flat_weight, share)
-        if self.settings.formulation == "lifted":
-            return c.lifted_flat_edge_terms(self.topology, self.flat_edges, weight=weight)
-        return c.flat_edge_terms(self.topology, self.flat_edges, weight=weight)
 
     def _directions(self) -> list[ElementTerm]:
         if self.settings.directions == "free":
@@ -350,11 +277,8 @@ class FairProblem:
         glides = self.settings.boundary == "glide"
         if not glides and not self._curves.points:
             return None
-        beside = self.topology.interior_edge_faces[self.flat_edges].reshape(-1)
-        panels = torch.cat([self.planar_faces, self.nearly_planar.faces, beside])
-        loose = self.topology.corners[torch.isin(self.topology.corner_faces, panels)]
         held = (self.topology.is_boundary_vertex & glides) | self._curves.on_creases
-        return GlidingBoundary(held, self._curves.curves(boundary=glides), self.pulls, loose)
+        return GlidingBoundary(held, self._curves.curves(boundary=glides), self.pulls, self.panels.corners)
 
     def _fairness(self) -> list[ElementTerm]:
         weight = self.settings.fairness_weight
@@ -439,11 +363,6 @@ class FairProblem:
             from_last=self.near.design_mode or self.pulls.everywhere,
             may_turn=self.pulls.everywhere,
         )
-
-
-def _raised(weight: float, share: float) -> float:
-    """A weight that is imposed by powers of ten, of which all of it has share 1."""
-    return max(weight, 1.0) ** share if weight else 0.0
 
 
 def feature_curves(vertices: Tensor, topology: Topology, settings: FairSettings) -> FeatureCurves:

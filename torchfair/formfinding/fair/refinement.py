@@ -75,9 +75,9 @@ def _carried(step: Refinement, problem: FairProblem, settings: FairSettings) -> 
     """The settings with the numbers of finer faces and edges that stay planar and flat."""
     coarse, fine = step.coarse, step.topology
     planar = torch.zeros(coarse.num_faces, dtype=torch.bool)
-    planar[problem.planar_faces] = True
+    planar[problem.panels.planar] = True
     flat = torch.zeros(coarse.num_edges, dtype=torch.bool)
-    flat[problem.flat_edges] = True
+    flat[problem.panels.flat] = True
     faces = torch.nonzero(step.carry_face_labels(planar)).squeeze(1)
     edges = torch.nonzero(step.carry_edge_labels(flat, parallel=True)[: fine.num_interior_edges]).squeeze(1)
     return replace(settings, planar=tuple(faces.tolist()), flat=tuple(edges.tolist()))
