@@ -89,7 +89,7 @@ def mesh_component(
         limit = settings.time_limit * (_SHARE if plan.creases and creased else 1.0)
         if number and (not settings.fallback or time.process_time() - began > limit):
             continue
-        for _ in range(1 + _RETRIES * (creased and plan.creases and plan.align)):
+        for _ in range(1 + _RETRIES * (settings.fallback and creased and plan.creases and plan.align)):
             number += 1
             try:
                 field, sharp = graph(plan.spacing, plan.smoothing, plan.creases), creases(plan.spacing, plan.creases)
