@@ -20,10 +20,11 @@ autodoc_typehints = "none"
 napoleon_google_docstring = True
 nitpicky = True  # a reference that leads nowhere is a warning
 nitpick_ignore_regex = [
-    ("py:class", r"(torch|abc|collections|scipy)\..*"),
+    ("py:class", r"(torch|abc|collections|scipy|numpy|pathlib)\..*"),
     ("py:class", r"torchfair\.constraints\._indexed\.IndexedModule"),  # what moves indices
     ("py:class", r"torchfair\.projection\.(system\.Evaluation|state\.Linearised|course\.Course)"),  # parts of a state
     ("py:class", r"torchfair\.formfinding\.job\..*\.[A-Z]"),  # type variables
+    ("py:class", r"torchfair\.(_names\.(Names|Sentence)|meshing\.components\.ReadSurface)"),  # parts of meshes that are read
 ]
 
 

@@ -22,7 +22,7 @@ def planar_quads(
 ) -> tuple[QuadMesh, JobResult[Level]]:
     """A principal mesh with planar polygons near the surface that it was made from.
 
-    Lowers E under :data:`PLANAR_QUADS`; what `torchfair mesh --planar` does.
+    Lowers E under ``PLANAR_QUADS``; what `torchfair mesh --planar` does.
 
     Args:
         mesh: from :func:`torchfair.meshing.principal_quads`.
