@@ -24,7 +24,10 @@ nitpick_ignore_regex = [
     ("py:class", r"torchfair\.constraints\._indexed\.IndexedModule"),  # what moves indices
     ("py:class", r"torchfair\.projection\.(system\.Evaluation|state\.Linearised|course\.Course)"),  # parts of a state
     ("py:class", r"torchfair\.formfinding\.job\..*\.[A-Z]"),  # type variables
-    ("py:class", r"torchfair\.(_names\.(Names|Sentence)|meshing\.components\.ReadSurface)"),  # parts of meshes that are read
+    (
+        "py:class",
+        r"torchfair\.(_names\.(Names|Sentence)|meshing\.components\.ReadSurface)",
+    ),  # parts of meshes that are read
 ]
 
 

@@ -101,6 +101,7 @@ def pulled(mesh: Mesh, config: Config, energy_weight: float) -> JobResult[Level]
         flat="none",  # pairs of triangles are coplanar at the start by symmetry, and are no panels
         smallest_angle=math.radians(5),  # the shape changes a lot: only collapse is forbidden
         smallest_area=0.05,
+        faces_may_turn=True,  # a dome becomes a saddle
     )
     settings = replace(settings, projection=replace(settings.projection, max_iterations=200, merit_tolerance=1e-6))
     handles = saddle_handles(*mesh, config.pull)

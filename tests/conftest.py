@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 
@@ -12,6 +13,10 @@ from pretended_device import PRETENDED, PretendedDevice
 
 settings.register_profile("torchfair", deadline=None)  # how long an example takes says more about the machine
 settings.load_profile("torchfair")
+
+if "PYTEST_XDIST_WORKER" in os.environ:  # workers share the cores: threads of each would wait for those of others
+    torch.set_num_threads(1)
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # of programs that tests start
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as shells set it for jobs in the background: tests press Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)

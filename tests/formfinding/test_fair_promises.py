@@ -81,6 +81,15 @@ def test_handles_turn_no_face_over_or_say_so() -> None:
             assert not result.holds
 
 
+def test_faces_may_turn_over_where_that_is_asked_for() -> None:
+    vertices, topology = sheet()
+    normals, target = face_normals(vertices, topology), (3.4, 0.0, 1.5)
+    settings = FairSettings(faces_may_turn=True)
+    result = minimise_normal_variation(vertices, topology, handles={24: target}, settings=settings)
+    assert ((face_normals(result.vertices, topology) * normals).sum(1) <= 0.0).any()
+    assert not any(promise.name == "faces turned over" for promise in result.promises)
+
+
 def test_a_free_boundary_does_not_shrink() -> None:
     vertices, topology = sheet()
     area = float(face_areas(vertices, topology).sum())

@@ -102,7 +102,8 @@ def check_guarantees(
 @pytest.mark.parametrize("name", MESHES)
 def test_energy_falls_and_every_guarantee_holds(name: str) -> None:
     vertices, topology = MESHES[name]()
-    result = minimise_normal_variation(vertices, topology)
+    settings = FairSettings(crease_angle=0.0)  # the torus is so coarse that its edges are sharp
+    result = minimise_normal_variation(vertices, topology, settings=settings)
     check_guarantees(vertices, topology, result)
     assert result.after["normal_variation"] < 0.97 * result.before["normal_variation"]
     assert result.projection.history[-1].quantities["normal_variation"] == pytest.approx(

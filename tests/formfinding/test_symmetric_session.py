@@ -92,7 +92,7 @@ def test_settling_far_from_the_handle_goes_on_as_the_whole_job_does() -> None:
 
 
 def test_nothing_is_compiled_anew_whatever_is_steered(monkeypatch: pytest.MonkeyPatch) -> None:
-    from torchfair.formfinding.job import session as module
+    from torchfair.formfinding.job import compiled_problems as module
 
     session = opened()
     drag(session, 2)

@@ -113,7 +113,9 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
     if problem.largest_areas is not None:
         growth, remedy = after["largest_growth"], "raise largest_area, or allow smaller areas"
         promises.append(Promise("growth of a face, by", settings.largest_area, growth, remedy=remedy))
-    promises.append(Promise("faces turned over", 0.0, after["flipped_faces"], remedy="pull less, or in several steps"))
+    if not settings.faces_may_turn:
+        remedy = "pull less, in several steps, or allow it: faces_may_turn"
+        promises.append(Promise("faces turned over", 0.0, after["flipped_faces"], remedy=remedy))
     if problem.panels.planar.numel() and settings.planarity_weight:
         promises.append(Promise(_OF_PANELS, PLANAR_PROMISE, after["largest_planarity"], remedy=_FREER))
     if problem.panels.nearly.faces.numel():

@@ -361,7 +361,7 @@ class FairProblem:
             smallest_area=bounded * self.settings.smallest_area,
             largest_areas=self.largest_areas,
             from_last=self.near.design_mode or self.pulls.everywhere,
-            may_turn=self.pulls.everywhere,
+            may_turn=self.pulls.everywhere or self.settings.faces_may_turn,
         )
 
 

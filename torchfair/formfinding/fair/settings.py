@@ -81,6 +81,8 @@ class FairSettings:
         smallest_area: No face falls below this fraction of its area.
         largest_area: No face grows above this many times its area, or half the mean area where that is more, unless
             handles stretch it.
+        faces_may_turn: Whether faces may turn over against the start where handles pull, step by step: for shapes that
+            end far from where they begin.
         quality_weight: Weight of half the squared barriers before those bounds.
         smoothing: ``l l*`` below this is treated as flat.
         continuation: Factors of ``smoothing`` in stages before the last, falling; empty for the last stage alone.
@@ -115,6 +117,7 @@ class FairSettings:
     smallest_angle: float = setting(math.radians(10.0), unit="radians")
     smallest_area: float = 0.2
     largest_area: float = 3.0
+    faces_may_turn: bool = False
     quality_weight: float = 0.1
     smoothing: float = 1e-2
     continuation: tuple[float, ...] = (10.0, 3.0)
