@@ -287,7 +287,7 @@ SYMMETRIC_PHASES = {
     "finer problem": ("symmetric.recipe:SymmetricProblem", 2, 1),
     "measuring the finer start": ("symmetric.recipe:symmetric_measures", 3, 1),
     "finer snapshot": ("symmetric.problem:SymmetricProblem.snapshot", 2, 1),
-    "measuring the finer result": ("symmetric.recipe:symmetric_measures", 4, 2),
+    "measuring the finer result": ("symmetric.recipe:symmetric_measures", 5, 2),
 }
 
 
