@@ -143,6 +143,7 @@ def test_wrong_requests_are_one_line(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_nothing_is_written_where_there_is_no_mesh(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mesh = irregular_triangles(SADDLE, 300)
     shift = torch.randn(mesh.vertices.shape, generator=torch.Generator().manual_seed(0))

@@ -132,6 +132,7 @@ def test_parts_add_up():
     torch.testing.assert_close(result.compared, result.window.to(DOUBLE).mean((-2, -1)))
 
 
+@pytest.mark.slow
 def test_without_reference_is_with_the_mesh_itself_shaded_smoothly():
     vertices, topology = torus(12, 8)
     own = reflection_score(vertices, topology, **SMALL)

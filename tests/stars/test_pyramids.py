@@ -54,6 +54,7 @@ def on_circle(degrees: list[float], height: float = 0.8) -> torch.Tensor:
 # ---- Prop. 1 -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_good_saddles_have_no_self_intersecting_pyramid() -> None:
     seen = 0
     for seed, (height, saddle) in enumerate([(0.1, 0.4), (0.1, 0.8), (0.3, 1.5), (0.6, 3), (0.05, 0.5), (0.02, 0.05)]):
