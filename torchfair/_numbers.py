@@ -34,6 +34,12 @@ def check_number(
     raise SettingsError(f"{name} must be a {'finite ' if finite else ''}number {bounds}, got {value!r}")
 
 
+def check_radians(name: str, value: float) -> None:
+    """Raises SettingsError naming the setting unless it is an angle between 0 and pi."""
+    if not 0 <= value <= math.pi:
+        raise SettingsError(f"{name}: expected radians between 0 and pi, got {value}. Use math.radians for degrees.")
+
+
 def check_count(name: str, value: object, *, least: int) -> None:
     """Raises SettingsError naming the setting unless it is a whole number of at least ``least``."""
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import math
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from .errors import SettingsError, ShapeError
+from ._numbers import check_radians
+from .errors import ShapeError
 from .topology import Topology
 
 
@@ -49,10 +49,7 @@ def boundary_corners(vertices: Tensor, topology: Topology, corner_angle: float) 
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
         SettingsError: if ``corner_angle`` is not between 0 and pi.
     """
-    if not 0 <= corner_angle <= math.pi:
-        raise SettingsError(
-            f"corner_angle: expected radians between 0 and pi, got {corner_angle}. Use math.radians for degrees."
-        )
+    check_radians("corner_angle", corner_angle)
     return boundary_turning(vertices, topology) > corner_angle
 
 

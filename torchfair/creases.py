@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from .errors import SettingsError, ShapeError
+from ._numbers import check_radians
+from .errors import ShapeError
 from .geometry import dihedral_angles
 from .topology import Topology
 
@@ -50,10 +50,7 @@ def crease_edges(vertices: Tensor, topology: Topology, crease_angle: float) -> T
     topology.check_vertices(vertices)
     if vertices.ndim != 2:
         raise ShapeError("vertices", f"({topology.num_vertices}, 3), one mesh", tuple(vertices.shape))
-    if not 0 <= crease_angle <= math.pi:
-        raise SettingsError(
-            f"crease_angle: expected radians between 0 and pi, got {crease_angle}. Use math.radians for degrees."
-        )
+    check_radians("crease_angle", crease_angle)
     if crease_angle == 0:
         return torch.zeros(0, dtype=torch.int64, device=topology.device)
     return torch.nonzero(dihedral_angles(vertices.detach(), topology).abs() > crease_angle).squeeze(1)

@@ -37,6 +37,7 @@ def even_settings(asked: Collection[str], settings: Any) -> Any:
 
 def _seed(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[int | None, str]:
     """A principal edge, if one is named or marked, and what was decided, in words."""
+    from .._graph import edge_numbers
     from ..io import load_edge_labels
     from ..principal import triangles_from_quads
 
@@ -51,8 +52,8 @@ def _seed(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[int | None,
         raise CommandError(f"--labels: {file} marks no edge")
     seed = int(numbers[0])
     family = triangles_from_quads(mesh.vertices, mesh.topology, seed)
-    known = {frozenset(pair) for pair in family.topology.edges[family.mask].tolist()}
-    strange = [pair for pair in mesh.topology.edges[marked].tolist() if frozenset(pair) not in known]
+    pairs = mesh.topology.edges[marked]
+    strange = pairs[~family.mask[edge_numbers(family.topology, pairs)]].tolist()
     if strange:
         raise CommandError(
             f"--labels: {file} marks edges of both families of the quads, such as {mesh.topology.edges[seed].tolist()} "

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from ..._graph import edge_numbers
 from ...boundary import boundary_corners
 from ...constraints.fairness import second_difference
 from ...creases import crease_chains, crease_corners, crease_edges
@@ -48,8 +49,11 @@ class FeatureCurves(NamedTuple):
         closed = [chain.closed for chain in chains]
         turns = boundary_corners(vertices, topology, corner_angle) | (corners & topology.is_boundary_vertex)
         edges = torch.full((topology.num_edges,), -1)
-        numbers = _numbers(topology, found, [chain.vertices for chain in chains], closed)
-        edges[found] = torch.tensor(numbers, dtype=torch.int64)
+        walks = [torch.cat([walk, walk[:1]]) if ring else walk for walk, ring in chains]
+        if walks:
+            ends = [walk.unfold(0, 2, 1) for walk in walks]
+            numbers = torch.arange(len(ends)).repeat_interleave(torch.tensor([len(pairs) for pairs in ends]))
+            edges[edge_numbers(topology, torch.cat(ends))] = numbers
         rim = BoundaryCurves.through(vertices, topology, turns)
         return cls(rim, points, closed, edges, corners, _owners(topology, edges, corners))
 
@@ -94,16 +98,6 @@ class FeatureCurves(NamedTuple):
         edges, corners = step.carry_edge_labels(self.edges, fill=-1), step.carry_vertex_labels(self.corners)
         owners = _owners(step.topology, edges, corners)
         return self._replace(rim=self.rim.refined(step), edges=edges, corners=corners, owners=owners)
-
-
-def _numbers(topology: Topology, edges: Tensor, chains: list[Tensor], closed: list[bool]) -> list[int]:
-    """For each of the crease ``edges`` (n,) the number of the chain that runs along it."""
-    of_pair = {}
-    for number, (chain, ring) in enumerate(zip(chains, closed, strict=True)):
-        walk = chain.tolist()
-        following = [*walk[1:], *walk[:1]] if ring else walk[1:]
-        of_pair.update({frozenset(pair): number for pair in zip(walk, following, strict=False)})
-    return [of_pair[frozenset(pair)] for pair in topology.edges[edges].tolist()]
 
 
 def _owners(topology: Topology, edges: Tensor, corners: Tensor) -> Tensor:
