@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import torch
 from torch import Tensor
@@ -29,6 +29,24 @@ def read_handles(handles: Mapping[int, Sequence[float]], topology: Topology) -> 
             raise MeshError(f"handle {vertex} is no vertex: numbers run from 0 to {topology.num_vertices - 1}")
         targets[row] = point
     return torch.tensor(list(handles), dtype=torch.int64), targets
+
+
+def vertex_numbers(chosen: Iterable[int], topology: Topology, what: str = "") -> Tensor:
+    """Numbers of vertices (n,).
+
+    Args:
+        chosen: The numbers.
+        topology: Of the mesh.
+        what: Begins the message of the error.
+
+    Raises:
+        MeshError: one is out of range.
+    """
+    numbers, count = list(chosen), topology.num_vertices
+    wrong = [number for number in numbers if not 0 <= number < count]
+    if wrong:
+        raise MeshError(f"{what}vertices are numbered 0 to {count - 1}, got {wrong[:5]}")
+    return torch.tensor(numbers, dtype=torch.int64)
 
 
 def refuse_unreachable_handles(handles: Tensor, targets: Tensor, vertices: Tensor, stays: Tensor) -> None:

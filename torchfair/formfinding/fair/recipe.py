@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-import torch
 from torch import Tensor
 
 from ...errors import MeshError
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ...topology import Topology
+from ..handles import vertex_numbers
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference, refuse_far_reference
 from .feature_curves import FeatureCurves
@@ -76,15 +76,13 @@ class FairRecipe(Recipe[FairSettings]):
 
     def _fix(self, fixed: Iterable[int], handles: Iterable[int]) -> None:
         """Holds vertices where they are; MeshError for what is no vertex, or is pulled."""
-        numbers = sorted(set(fixed))
-        wrong = [number for number in numbers if not 0 <= number < self.topology.num_vertices]
-        if wrong:
-            raise MeshError(f"fixed: vertices are numbered 0 to {self.topology.num_vertices - 1}, got {wrong[:5]}")
-        both = sorted(set(numbers) & set(handles))
+        chosen = sorted(set(fixed))
+        numbers = vertex_numbers(chosen, self.topology, "fixed: ")
+        both = sorted(set(chosen) & set(handles))
         if both:
             raise MeshError(f"vertices cannot be fixed and pulled at once: {both[:5]}")
-        if numbers:
-            self.pulls.hold(torch.tensor(numbers, dtype=torch.int64))
+        if chosen:
+            self.pulls.hold(numbers)
             self.notes.append(f"{len(numbers)} vertices are fixed")
 
     def take_settings(self, settings: FairSettings) -> None:

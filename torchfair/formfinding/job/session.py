@@ -12,7 +12,7 @@ from torch import Tensor
 
 from ..._interrupts import deferred_interrupts
 from ..._threads import threads_for
-from ...errors import MeshError, SettingsError
+from ...errors import SettingsError
 from ...projection import (
     Callback,
     GuidedProjection,
@@ -27,6 +27,7 @@ from ...projection import (
 )
 from ...projection.layout import State
 from ...projection.stopwatch import Stopwatch
+from ..handles import vertex_numbers
 from ..stopping import interrupted, stopped
 from .compiled_problems import CompiledProblems
 from .plan import Plan, Stage
@@ -127,13 +128,13 @@ class Session(Generic[R]):
 
     def hold(self, vertices: Iterable[int]) -> None:
         """Keeps vertices where they are, from now on."""
-        self.recipe.pulls.hold(self._numbers(vertices))
+        self.recipe.pulls.hold(vertex_numbers(vertices, self.recipe.topology))
         self.recipe.reconsider()
         self._moved = True
 
     def free(self, vertices: Iterable[int]) -> None:
         """Lets vertices go that were pulled or held."""
-        self.recipe.pulls.free(self._numbers(vertices))
+        self.recipe.pulls.free(vertex_numbers(vertices, self.recipe.topology))
         self.recipe.reconsider()
         self._moved = True
 
@@ -151,13 +152,6 @@ class Session(Generic[R]):
         changed = {f"{name}_weight": value for name, value in weights.items()}
         self.recipe.take_settings(replace(settings, **changed))
         self._moved = True
-
-    def _numbers(self, vertices: Iterable[int]) -> Tensor:
-        chosen, count = list(vertices), self.recipe.topology.num_vertices
-        wrong = [vertex for vertex in chosen if not 0 <= vertex < count]
-        if wrong:
-            raise MeshError(f"vertices are numbered 0 to {count - 1}, got {wrong[:5]}")
-        return torch.tensor(chosen, dtype=torch.int64)
 
     # ---- live ------------------------------------------------------------------------------------------
 
