@@ -121,11 +121,10 @@ def measure(vertices: Tensor, topology: Topology) -> Report:
 
 def _masks(classes: StarClasses) -> dict[str, Tensor]:
     """Vertices by class, all inner ones first."""
-    saddle = classes.is_kind(StarKind.SADDLE)
     return {
         "all": ~classes.is_kind(StarKind.EXCLUDED),
         "good": classes.good,
-        "bad": saddle & ~classes.good,
+        "bad": classes.bad_saddles,
         "neither": classes.is_kind(StarKind.NEITHER),
         "convex": classes.is_kind(StarKind.CONVEX),
     }

@@ -36,9 +36,9 @@ class FairGuard:
         *,
         smallest_angle: float,
         smallest_area: float,
-        largest_areas: Tensor | None = None,
+        largest_areas: Tensor | None,
         from_last: bool,
-        may_turn: bool = True,
+        may_turn: bool,
     ) -> None:
         self.topology, self.placed = topology, placed
         self._smallest_angle, self._from_last = smallest_angle, from_last
@@ -49,12 +49,14 @@ class FairGuard:
 
     def keeps_faces(self, state: State, trial: State) -> bool:
         """Whether no face turns over."""
-        start, before, after = (mesh.area_vectors for mesh in (self._start, self._mesh(state), self._mesh(trial)))
+        start, after = self._start.area_vectors, self._mesh(trial).area_vectors
+        upright = dot(start, after) > 0.0
         if not self._from_last:
-            return bool((dot(start, after) > 0.0).all())
+            return bool(upright.all())
+        before = self._mesh(state).area_vectors
         kept = dot(before, after) > 0.0
         if not self._may_turn:
-            kept = kept & ((dot(start, after) > 0.0) | (dot(start, before) <= 0.0))
+            kept = kept & (upright | (dot(start, before) <= 0.0))
         return bool(kept.all())
 
     def keeps_bounds(self, trial: State) -> bool:
@@ -78,13 +80,11 @@ class FairGuard:
         return self._mesh(state).energy
 
     def _mesh(self, state: State) -> _Mesh:
-        """That of a state; the last two are kept, since the next step starts from the trial that was admitted."""
+        """That of a state; the two that were asked for last are kept: the state, and the trial that may follow it."""
         vertices = state["vertices"]
-        for known, mesh in self._known:
-            if known is vertices:
-                return mesh
-        mesh = _Mesh(self.placed(state), self.topology)
-        self._known = [(vertices, mesh), *self._known[:1]]
+        mesh = next((mesh for known, mesh in self._known if known is vertices), None)
+        mesh = mesh or _Mesh(self.placed(state), self.topology)
+        self._known = [(vertices, mesh), *[pair for pair in self._known if pair[0] is not vertices][:1]]
         return mesh
 
 

@@ -76,9 +76,9 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "flipped_faces": int((turned <= 0.0).sum()),
         "largest_planarity": _largest(warps[problem.panels.planar]),
         "largest_planarity_of_all": _largest(warps[topology.face_sizes > 3]),
-        "largest_planarity_growth": max(0.0, _largest(problem.panels.growth(vertices))),
+        "largest_planarity_growth": max(0.0, _largest(problem.panels.nearly.growth(warps))),
         "largest_fold_degrees": math.degrees(_largest(problem.panels.folds(vertices))),
-        "largest_handle_distance": unit.length * _largest(problem.pulls.away(normalised)),
+        "largest_handle_distance": unit.length * problem.pulls.farthest(normalised),
     }
 
 
@@ -88,14 +88,15 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
     promises = []
     if not problem.has_other_goals:
         promises.append(Promise("E", before["normal_variation"], after["normal_variation"]))
-    if problem.near.limits is not None and not problem.near.design_mode:
+    bounded = problem.near.limits is not None and not problem.near.design_mode
+    if bounded:
         asked = max(settings.distance_limit or 0.0, problem.distance_for_planarity)
         most, reached = max(asked, before["largest_distance_relative"]), after["largest_distance_relative"]
         remedy = "raise distance_limit, or pull less"
         promises.append(
             Promise("distance from the reference", most, reached, unit=_EDGES, remedy=remedy, of_settings=asked)
         )
-    if problem.near.limits is not None and not (problem.near.design_mode or not problem.near_input):
+    if bounded and problem.near_input:
         asked, reached = settings.distance_back, after["largest_distance_back_relative"]
         most = max(asked, before["largest_distance_back_relative"])
         remedy = "something is cut off: lower crease_angle, refine, or raise distance_back"

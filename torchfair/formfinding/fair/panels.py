@@ -109,16 +109,12 @@ class Panels:
             return vertices.new_zeros(0)
         return dihedral_angles(vertices, self._topology)[self.flat].abs()
 
-    def growth(self, vertices: Tensor) -> Tensor:
-        """(n,) by how much nearly planar faces of a mesh (V, 3) are less planar than they were."""
-        return self.nearly.growth(vertices, self._topology)
-
     def are_planar(self, vertices: Tensor) -> bool:
         """Whether a mesh (V, 3) is well within the tolerances that the job promises."""
-        settings = self._settings
-        if settings.planarity_weight and bool((self.warps(vertices) > _PLANAR_ENOUGH).any()):
+        settings, warps = self._settings, planarity(vertices, self._topology)
+        if settings.planarity_weight and bool((warps[self.planar] > _PLANAR_ENOUGH).any()):
             return False
-        if bool((self.growth(vertices) > _PLANAR_ENOUGH).any()):
+        if bool((self.nearly.growth(warps) > _PLANAR_ENOUGH).any()):
             return False
         return not settings.flat_weight or not bool((self.folds(vertices) > _FLAT_ENOUGH).any())
 

@@ -55,10 +55,10 @@ class FairPlan(Plan):
         problem, start = self._problem, self.state["vertices"]
         every = problem.settings.projection.takes_every_step
         problem.most_warped = math.inf
-        energy, warp = problem.energy(start), problem.largest_warp(start)
         yield from self._lowered(self.planned(), start, _LARGEST_SHARE if not every else 1.0)
         if every or not problem.panels.makes_planar:
             return
+        energy, warp = problem.energy(start), problem.largest_warp(start)
         first = self.state["vertices"]
         if problem.largest_warp(first) <= PLANAR_PROMISE and problem.energy(first) <= energy:
             return

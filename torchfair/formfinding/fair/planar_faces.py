@@ -62,9 +62,9 @@ class NearlyPlanar(NamedTuple):
         """Without any face."""
         return NearlyPlanar(self.faces[:0], self.most[:0])
 
-    def growth(self, vertices: Tensor, topology: Topology) -> Tensor:
-        """(n,) by how much faces are less planar than they were; negative where they are more so."""
-        return planarity(vertices, topology)[self.faces] - self.most
+    def growth(self, warps: Tensor) -> Tensor:
+        """(n,) by how much faces are less planar than they were, of the planarity (F,) of all; else negative."""
+        return warps[self.faces] - self.most
 
     def terms(self, topology: Topology, *, weight: float) -> list[ElementTerm]:
         """Distances of diagonals beyond what they may be; the weight multiplies half their squares."""

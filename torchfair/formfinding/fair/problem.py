@@ -82,7 +82,6 @@ class FairProblem:
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
         self.boundary = self._gliding_boundary()
-        self._free = FreeBoundary(vertices, topology, self._curves, pulls)
         self.most_warped, self.distance_for_planarity = math.inf, 0.0
         limit = settings.distance_limit
         self.near = Nearness(
@@ -134,8 +133,7 @@ class FairProblem:
         Handles move on in small portions and planarity is raised by powers of ten, so that the barriers
         around badly shaped faces are never asked to hold against a sudden pull.
         """
-        pulled = self.pulls.away(vertices)
-        steps = math.ceil(float(pulled.max()) / _LONGEST_PULL) if pulled.numel() else 1
+        steps = math.ceil(self.pulls.farthest(vertices) / _LONGEST_PULL)
         if self.panels.come_in_stages(vertices):
             steps = max(steps, _PLANARITY_STAGES)
         steps = max(1, min(steps, _MOST_STAGES))
@@ -296,6 +294,10 @@ class FairProblem:
         gliding = c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight)
         weights = self.boundary.glides.to(self.vertices)
         return [*free, *(replace(term, element_weights=weights) for term in gliding)]
+
+    @cached_property
+    def _free(self) -> FreeBoundary:
+        return FreeBoundary(self.vertices, self._curves.rim, self.pulls)
 
     def _loosely(self) -> list[ElementTerm]:
         """Draws corners that may move to where they were."""
