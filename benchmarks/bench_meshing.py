@@ -36,9 +36,10 @@ from torch import Tensor
 from torchfair import Topology, TorchfairError
 from torchfair.geometry import edge_lengths
 from torchfair.io import load_mesh
-from torchfair.meshing import MeshingSettings, principal_quads
-from torchfair.meshing.components import read_surface
+from torchfair.meshing import MeshCreases, MeshingSettings, principal_quads
+from torchfair.meshing.components import ReadSurface, read_surface
 from torchfair.meshing.report import measure
+from torchfair.meshing.verification import shape_of
 from torchfair.shapes import (
     Catenoid,
     Enneper,
@@ -149,8 +150,8 @@ def ours(surface: Mesh, count: int) -> PeerMesh | str:
     return PeerMesh(made.vertices.numpy(), made.topology, min(times))
 
 
-def judged(mesh: PeerMesh | str, surface: Mesh) -> dict[str, object]:
-    """What a mesh is like on the surface, by one measure for all."""
+def judged(mesh: PeerMesh | str, surface: Mesh, read: ReadSurface) -> dict[str, object]:
+    """What a mesh is like on the surface, which has been read, by one measure for all."""
     if isinstance(mesh, str):
         return {"failure": mesh}
     vertices = torch.as_tensor(mesh.vertices, dtype=torch.float64)
@@ -160,11 +161,9 @@ def judged(mesh: PeerMesh | str, surface: Mesh) -> dict[str, object]:
     except TorchfairError as error:
         return {"failure": f"no manifold ({error})", "seconds": mesh.seconds}
     spacing = float(edge_lengths(vertices, topology).mean())
-    read = read_surface(*surface, MeshingSettings())
-    report = measure(vertices, topology, read, spacing, vertices.new_zeros(0))
-    shape = surface[1]
-    euler = shape.num_vertices - shape.num_edges + shape.num_faces
-    same = report["euler_number"] == euler and report["boundary_loops"] == len(shape.boundary_loops())
+    no_creases = MeshCreases(torch.zeros((0, 2), dtype=torch.int64), vertices.new_zeros(0, 2, 3))
+    report = measure(vertices, topology, read, spacing, vertices.new_zeros(0), no_creases)
+    same = shape_of(topology) == shape_of(surface[1])
     return {
         "faces": topology.num_faces,
         "angle": report["angle_mean_degrees"],
@@ -189,8 +188,9 @@ def compare(names: list[str], count: int) -> dict[str, dict[str, dict[str, objec
     for name in names:
         surface = surface_of(name)
         arrays = surface[0].numpy(), surface[1].triangles.numpy()
-        rows = {OURS: judged(ours(surface, count), surface)}
-        rows |= {peer: judged(run_peer(peer, *arrays, count), surface) for peer in peers}
+        read = read_surface(*surface, MeshingSettings())
+        rows = {OURS: judged(ours(surface, count), surface, read)}
+        rows |= {peer: judged(run_peer(peer, *arrays, count), surface, read) for peer in peers}
         table[name] = rows
         for side, row in rows.items():
             print(f"{name if side == OURS else '':<18}{side:<16}{line(row)}", flush=True)

@@ -227,3 +227,13 @@ def test_distances_are_measured_both_ways() -> None:
     assert MeshCreases(torch.tensor([[0, 1], [1, 2]]), given[:1]).distance(vertices) == pytest.approx(1.0)
 
     assert MeshCreases(torch.zeros((0, 2), dtype=torch.int64), given).distance(vertices) == 0.0
+
+
+def test_the_length_of_creases_does_not_count_how_finely_they_are_cut() -> None:
+    ends = torch.tensor([[[0.0, 0, 0], [3, 4, 0]], [[3.0, 4, 0], [3, 4, 2]]], dtype=torch.float64)
+    middles = ends.mean(1, keepdim=True)
+    halves = torch.cat([torch.cat([ends[:, :1], middles], 1), torch.cat([middles, ends[:, 1:]], 1)])
+    none = torch.zeros((0, 2), dtype=torch.int64)
+    assert MeshCreases(none, ends).length == pytest.approx(7.0)
+    assert MeshCreases(none, halves).length == pytest.approx(7.0)
+    assert MeshCreases(none, ends[:0]).length == 0.0

@@ -80,6 +80,14 @@ class FaceFrames:
         return cls(topology, points, triangles, normals, first, second, size / 2, edges, faces, corners,
                    np.linalg.norm(along, axis=1), np.arctan2(y, x), topology.is_boundary_vertex.numpy())  # fmt: skip
 
+    def grown(self, inside: Bools, rings: int) -> Bools:
+        """(F,) triangles within rings of neighbours of some (F,)."""
+        for _ in range(rings):
+            near = np.zeros(len(self.points), bool)
+            near[self.triangles[inside]] = True
+            inside = np.asarray(near[self.triangles].any(1))
+        return inside
+
     @property
     def turns(self) -> Floats:
         """(I,) by how much an angle grows from the left face to the right face of an edge."""

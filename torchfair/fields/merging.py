@@ -102,10 +102,9 @@ def _split(
 
     One part after the other goes as far as the radius, each as far from those before as it can, among vertices inside.
     """
-    touched = np.zeros(len(frames.points), bool)
+    touched, graph = np.zeros(len(frames.points), bool), _inner_edges(frames)
     most = _MOST_POSITIVE[symmetry]
     for vertex in np.flatnonzero(charges > most).tolist():
-        graph = _inner_edges(frames)
         distance, before = dijkstra(graph, True, np.array(vertex), True, limit=2 * radius)
         near = np.flatnonzero(np.isfinite(distance) & (distance <= radius) & (charges == 0))
         steps: list[tuple[int, int, int]] = []
@@ -156,11 +155,7 @@ def _refit(
     symmetry: Symmetry,
 ) -> Floats:
     """Angles that fit new matchings, by the smoothness and the principal directions of the field."""
-    near = touched[frames.triangles].any(1)
-    for _ in range(_RINGS):
-        beside = np.zeros(len(frames.points), bool)
-        beside[frames.triangles[near]] = True
-        near = beside[frames.triangles].any(1)
+    near = frames.grown(np.asarray(touched[frames.triangles].any(1)), _RINGS)
     trust = directions.confidence * np.where(near, _LOOSE, 1.0)
     pull = frames.areas * trust / smoothing**2 + 1e-9 * frames.areas / frames.areas.mean()
     stiffness = connection_laplacian(frames, np.ones(len(frames.faces), complex)) + sp.diags(pull)

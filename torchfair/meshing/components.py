@@ -31,6 +31,7 @@ from .verification import Shape, shape_of
 _CORRECTIONS = 2
 _SHARE = 1 / 6  # of the time limit, for a correction
 _COUNT_TOLERANCE = 0.08
+_ROUNDING = 1e-9
 _FAR = 0.25  # beyond that other settings are taken for the sake of the count
 
 
@@ -241,7 +242,8 @@ def mesh_to_count(
             again = mesh_components(surface, lattices, other, short, best.plans)
         except NoMeshError:
             break
-        if len(again.creases.given) < len(best.creases.given) or abs(faces_of(again) / count - 1) >= abs(ratio - 1):
+        lost = again.creases.length < (1 - _ROUNDING) * best.creases.length
+        if lost or abs(faces_of(again) / count - 1) >= abs(ratio - 1):
             break
         if len(again.notes) > len(best.notes) and abs(ratio - 1) <= _FAR:
             break

@@ -71,7 +71,11 @@ def mesh_component(
     def finer(spacing: float, kept: bool) -> tuple[DesignSurface, Directions]:
         if kept or not creased:
             return surface.cut_finer(directions, spacing)
-        return plain.cut_finer(plain.directions(settings.noise)[0], spacing)
+        return plain.cut_finer(smooth(), spacing)
+
+    @cache
+    def smooth() -> Directions:
+        return plain.directions(settings.noise)[0]
 
     @cache
     def creases(spacing: float, kept: bool) -> Creases:
@@ -86,10 +90,10 @@ def mesh_component(
 
     tried = enumerate(plans(spacing, smoothing, settings, creased))
     for place, (plan, words) in itertools.islice(tried, first, None):
-        limit = settings.time_limit * (_SHARE if plan.creases and creased else 1.0)
+        limit = settings.time_limit * (_SHARE if plan.creases else 1.0)
         if number and (not settings.fallback or time.process_time() - began > limit):
             continue
-        for _ in range(1 + _RETRIES * (settings.fallback and creased and plan.creases and plan.align)):
+        for _ in range(1 + _RETRIES * (settings.fallback and plan.creases and plan.align)):
             number += 1
             try:
                 field, sharp = graph(plan.spacing, plan.smoothing, plan.creases), creases(plan.spacing, plan.creases)

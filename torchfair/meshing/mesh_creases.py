@@ -22,6 +22,11 @@ class MeshCreases:
     edges: Tensor
     given: Tensor
 
+    @property
+    def length(self) -> float:
+        """Of the sharp edges of the surface together, whose triangles may have been cut finer."""
+        return float(torch.linalg.vector_norm(self.given[:, 1] - self.given[:, 0], dim=1).sum())
+
     def to(self, like: Tensor) -> MeshCreases:
         """The same on the device and in the dtype of positions."""
         return MeshCreases(self.edges.to(like.device), self.given.to(like))

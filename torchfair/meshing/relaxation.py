@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..fields.frames import Bools, Floats, Ints
+from ..fields.frames import Bools, Floats
 from .seamless_map import MapProblem
 
 _FOLLOWED = 0.8  # of the logarithm of a stretch
@@ -48,7 +48,7 @@ def loosened(problem: MapProblem, wanted: Floats, rounds: int = _ROUNDS) -> MapP
         over: Bools = a * d - b * c < _THIN
         if not over.any():
             break
-        near = grown(frames.triangles, over, len(frames.points), _RINGS)
+        near = frames.grown(over, _RINGS)
         weights = np.where(near, np.maximum(problem.anisotropy / _LOOSER, 1.0), problem.anisotropy)
         problem = replace(problem, anisotropy=weights, density=_followed(problem, wanted))
     return problem
@@ -58,12 +58,3 @@ def _followed(problem: MapProblem, wanted: Floats) -> Floats:
     found = problem.density * problem.real_jacobians[[0, 3]].T
     stretch = np.clip(found / wanted, 1 / _MOST_STRETCH, _MOST_STRETCH)
     return np.asarray(wanted * stretch**_FOLLOWED)
-
-
-def grown(triangles: Ints, inside: Bools, num_vertices: int, rings: int) -> Bools:
-    """Triangles within rings of neighbours of some."""
-    for _ in range(rings):
-        near = np.zeros(num_vertices, bool)
-        near[triangles[inside]] = True
-        inside = np.asarray(near[triangles].any(1))
-    return inside

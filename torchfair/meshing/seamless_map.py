@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ import torch
 
 from ..fields.frames import FaceFrames, Floats, Ints
 from ..fields.matchings import QUARTER
-from ..linear import Factor, RslabDirect, factorise
+from ..linear import Factor, LinearSolver, RslabDirect, ScipyDirect, factorise
 from .cut_graph import CutGraph
 from .integers import IntegerSplit, real_form
 from .seams import ROTATIONS, Seams
@@ -95,6 +95,7 @@ class MapProblem:
         shear: (2, 2) from whole coordinates to those whose gradients follow the field.
         density: (F, 2) gradients wanted along and across the field, one over lengths.
         anisotropy: (F,) weight of the wrong direction of gradients over that of their lengths.
+        solver: keeps its analysis from one problem to the next that differs in density and weights only.
     """
 
     frames: FaceFrames
@@ -104,6 +105,7 @@ class MapProblem:
     shear: Floats
     density: Floats
     anisotropy: Floats
+    solver: LinearSolver = field(default_factory=lambda: RslabDirect() if RslabDirect.available() else ScipyDirect())
 
     def candidates(self) -> list[SeamlessMap]:
         """Maps with whole numbers near the real optimum, the best first: less turned over, then nearer.
@@ -123,7 +125,7 @@ class MapProblem:
                 return [found[-1]]
         return sorted(found, key=badness)
 
-    @property
+    @cached_property
     def real_jacobians(self) -> Floats:
         """(4, F) of the optimum whose whole numbers may be any numbers, rows as in :meth:`jacobians`."""
         optimum = self._optimum
@@ -136,7 +138,7 @@ class MapProblem:
         free = (rows @ self.split.free).tocsc()
         whole = np.asarray((rows @ self.split.whole) @ self.split.basis)
         right = right - rows @ self.split.fixed
-        factor = factorise((free.T @ free).tocsr(), solver="rslab" if RslabDirect.available() else "scipy")
+        factor = factorise((free.T @ free).tocsr(), solver=self.solver)
         best = _solve(factor, free.T @ right)
         base = self.split.free @ best + self.split.fixed
         count = whole.shape[1]

@@ -9,7 +9,6 @@ import scipy.sparse as sp
 from scipy.optimize import minimize
 
 from ..fields.frames import Bools, Floats, Ints
-from .relaxation import grown
 from .seamless_map import WANTED, MapProblem, SeamlessMap, badness
 
 _RINGS = (3, 6, 12)  # around triangles turned over, tried one after the other
@@ -62,7 +61,7 @@ class _Patch:
         frames, triangles = found.frames, found.frames.triangles
         inside: Bools = np.asarray(np.isin(triangles, found.branches).any(1))
         inside[found.flips] = True
-        inside = grown(triangles, inside, len(frames.points), rings)
+        inside = frames.grown(inside, rings)
         rim = np.zeros(len(frames.points), bool)
         rim[triangles[~inside]] = True
         faces = np.flatnonzero(inside)
