@@ -132,3 +132,19 @@ def test_what_cannot_be_is_refused() -> None:
         crease_corners(vertices, topology, torch.tensor([12]), FORTY)
     with pytest.raises(ShapeError, match="two meet"):
         crease_chains(topology, torch.arange(12), torch.zeros(8, dtype=torch.bool))
+
+
+def test_an_edge_of_just_the_crease_angle_is_no_crease() -> None:
+    tent = torch.tensor([[0.0, 0, 0], [0, 1, 0], [1, 0, 1], [-1, 0, 1]], dtype=DOUBLE)
+    topology = Topology.from_faces([[0, 2, 1], [0, 1, 3]])
+    angle = float(dihedral_angles(tent, topology).abs().max())
+    assert not len(crease_edges(tent, topology, angle))
+    assert len(crease_edges(tent, topology, math.nextafter(angle, 0.0))) == 1
+
+
+def test_straight_on_is_no_corner_of_an_angle_of_zero() -> None:
+    x, y = torch.meshgrid(torch.arange(3, dtype=DOUBLE), torch.arange(3, dtype=DOUBLE), indexing="ij")
+    vertices = torch.stack([x, y, -(x - 1).abs()], -1).reshape(-1, 3)
+    topology = Topology.from_faces(grid_faces(3, 3))
+    corners = crease_corners(vertices, topology, crease_edges(vertices, topology, 0.5), 0.0)
+    assert torch.nonzero(corners).squeeze(1).tolist() == [3, 5]

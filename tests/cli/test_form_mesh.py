@@ -132,3 +132,13 @@ def test_without_the_option_nothing_is_said_of_quads(words: list[str], tmp_path:
     assert main([*words, "--no-pictures"]) == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"tube.obj", "report.json"}
     assert "principal_quads" not in json.loads((tmp_path / "out" / "report.json").read_text())
+
+
+def test_quads_are_cut_where_a_format_has_none(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words[words.index("-o") + 1] = str(tmp_path / "out" / "tube.stl")
+    assert main([*words, "--mesh", "40", "--no-pictures"]) in (0, 1)
+    assert "tube-quads.stl holds its polygons cut into triangles" in capsys.readouterr().out
+    assert load_mesh(tmp_path / "out" / "tube-quads.stl").topology.is_triangular
+    assert "principal_quads" in json.loads((tmp_path / "out" / "report.json").read_text())

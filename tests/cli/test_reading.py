@@ -140,3 +140,58 @@ def test_polygons_are_cut_where_a_format_has_none(
     made = load_mesh(tmp_path / f"o{suffix}")
     assert made.topology.num_faces == 32
     assert made.topology.num_vertices == 25
+
+
+def saddle_lines() -> list[str]:
+    """OBJ lines of a saddle of 7 x 7 vertices, the first of which no face uses."""
+    x, y = torch.meshgrid(*(torch.linspace(-1, 1, 7, dtype=torch.float64),) * 2, indexing="ij")
+    rows = torch.stack([x, y, 0.4 * (x**2 - y**2)], -1).reshape(-1, 3).tolist()
+    faces = [(7 * i + j, 7 * i + j + 7, 7 * i + j + 8, 7 * i + j + 1) for i in range(6) for j in range(6)]
+    triangles = [t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))]
+    points = ["v 9 9 9", *(f"v {p} {q} {r}" for p, q, r in rows)]
+    return [*points, *("f " + " ".join(str(corner + 2) for corner in face) for face in triangles)]
+
+
+def test_diagnose_names_vertices_as_the_file_does_after_repair(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "saddle.obj"
+    path.write_text("\n".join(saddle_lines()) + "\n")
+
+    def rows(*words: str) -> list[int]:
+        assert main(["diagnose", str(path), "--json", *words]) == 0
+        return [row["number_in_file"] for row in json.loads(capsys.readouterr().out)["worst_vertices"]]
+
+    assert rows("--repair") == rows()
+
+
+def test_symmetric_takes_marks_and_numbers_of_the_file_after_repair(tmp_path: Path) -> None:
+    path = tmp_path / "saddle.obj"
+    lines = [f"l {' '.join(str(7 * i + j + 2) for j in range(7))}" for i in range(7)]
+    path.write_text("\n".join([*saddle_lines(), *lines]) + "\n")
+    words = ["symmetric", str(path), "-o", str(tmp_path / "out.obj"), "--repair", "--no-pictures", "--steps", "1"]
+    assert main([*words, "--fix", "1"]) in (0, 1)  # the first vertex of a face
+    corner = load_mesh(tmp_path / "out.obj").vertices[0]
+    assert corner.tolist() == [-1.0, -1.0, 0.0]
+    assert main([*words, "--force", "--fix", "0"]) == 2  # was dropped
+    assert main([*words, "--force", "--seed", "1", "50"]) == 2
+
+
+def test_numbers_beyond_the_file_are_refused_though_repair_adds_vertices(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bow.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv -1 0 0\nv -1 -1 0\nf 1 2 3\nf 1 4 5\n")
+    words = ["fair", str(path), "-o", str(tmp_path / "o.obj"), "--repair", "--no-pictures"]
+    assert main([*words, "--fix", "5"]) == 2
+    assert "vertices of the file are numbered 0 to 4, got 5" in capsys.readouterr().err
+
+
+def test_what_meshing_has_read_is_in_its_report(tmp_path: Path) -> None:
+    path = tmp_path / "saddle.obj"
+    path.write_text("\n".join(saddle_lines()) + "\n")
+    words = ["mesh", str(path), "-o", str(tmp_path / "o.obj"), "--quads", "30", "--repair", "--no-pictures"]
+    assert main(words) in (0, 1)
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["repairs"]
+    assert report["vertex_map"][:3] == [-1, 0, 1]

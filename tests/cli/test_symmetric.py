@@ -251,3 +251,16 @@ def rotated_parallelogram(surface: Enneper, degrees: float) -> tuple[torch.Tenso
     a, b, c1, d = (part.flatten() for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
     faces = torch.cat([torch.stack([a, b, d], dim=1), torch.stack([b, c1, d], dim=1)])
     return surface.position(c * x - s * y, s * x + c * y), Topology.from_faces(faces)
+
+
+def test_cut_quads_are_named_and_what_their_file_held_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mesh = principal_quads(Torus(), 6, 12)
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
+    lines += ["g roof", *("f " + " ".join(str(v + 1) for v in face) for face in mesh.topology.face_lists())]
+    path = tmp_path / "quads.obj"
+    path.write_text("\n".join(lines) + "\n")
+    words = ["symmetric", str(path), "-o", str(tmp_path / "out.obj"), "--no-pictures", "--steps", "1"]
+    assert main(words) in (0, 1)
+    assert "out.obj does not hold" in capsys.readouterr().out

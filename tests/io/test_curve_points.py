@@ -97,3 +97,9 @@ def test_commas_that_may_be_either_are_refused(tmp_path: Path, row: str) -> None
     (tmp_path / "curve.csv").write_text(f"0;0;0\n{row}\n1;1;1\n")
     with pytest.raises(MeshFileError, match=r"line 2: .*not clear whether its comma is a decimal mark"):
         load_curve(tmp_path / "curve.csv")
+
+
+def test_a_comma_in_a_line_of_one_word_separates(tmp_path: Path) -> None:
+    (tmp_path / "curve.csv").write_text("0,0\n1 0 0\n")
+    with pytest.raises(MeshFileError, match="found 2"):
+        load_curve(tmp_path / "curve.csv")

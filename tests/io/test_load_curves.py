@@ -96,6 +96,9 @@ def test_line_elements_of_obj_files_are_joined(tmp_path: Path) -> None:
     path.write_text(vertices)
     with pytest.raises(MeshFileError, match="no line elements"):
         load_curves(path)
+    path.write_text("v 0 0 0\nv 1 0 0\nl 1 2 3 1\nv 0 1\n")
+    with pytest.raises(MeshFileError, match=r"line 4.*needs three coordinates"):
+        load_curves(path)
 
 
 def test_drawings_in_dxf_are_joined(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from helpers import DOUBLE
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair._names import Names
 from torchfair.geometry import edge_lengths
 from torchfair.measuring import diagnose_mesh, layout_advice, pattern_words, star_remedy
 from torchfair.shapes import Catenoid, Hyperboloid, Torus, icosphere, principal_triangles, rotated_lattice
@@ -62,7 +63,7 @@ def test_a_flipped_edge_is_flipped_back(first: int) -> None:
     a, b = ((set(topology.triangles[face].tolist()) - {v, w}).pop() for face in (f, g))
     faces = [face for i, face in enumerate(topology.face_lists()) if i not in (f, g)]
     flipped = Topology.from_faces([*faces, [v, b, a], [b, w, a]])
-    remedies = [star_remedy(vertices, flipped, vertex, first_number=first) for vertex in (v, w, a, b)]
+    remedies = [star_remedy(vertices, flipped, vertex, names=Names(first)) for vertex in (v, w, a, b)]
     words = [remedy.words for remedy in remedies if remedy is not None]
     numbers = [set(map(int, re.findall(r"\d+", text))) for text in words if text.startswith("flip")]
     assert {v + first, w + first, a + first, b + first} in numbers

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 from meshing_tools import irregular
 from torch import Tensor
@@ -69,3 +70,13 @@ def test_a_mesh_finer_than_the_triangles_has_no_facets_of_theirs() -> None:
         distances = ReferenceSurface(vertices, topology).closest(found.vertices).distances
         assert (float(distances.max()) > 1e-9) is curved
     assert abs(ratio[True] - 1) < 0.01 < 0.03 < ratio[False] - 1
+
+
+def test_points_move_by_a_fifth_of_a_side_at_most() -> None:
+    triangle = torch.tensor([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=torch.float64)
+    normals = torch.tensor([[0.0, 0, 1]] * 3, dtype=torch.float64)
+    operators = 100.0 * torch.diag(torch.tensor([1.0, 1.0, 0.0], dtype=torch.float64)).expand(3, 3, 3)
+    point = torch.tensor([[0.3, 0.3, 0.0]], dtype=torch.float64)
+    topology = Topology.from_faces([[0, 1, 2]])
+    moved = curved_surface.on_curved_surface(point, triangle, topology, normals, operators)
+    assert float((moved - point).norm()) == pytest.approx(0.2 * 2.0**0.5)

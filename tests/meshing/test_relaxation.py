@@ -85,3 +85,9 @@ def test_a_search_can_begin_with_a_later_plan() -> None:
     assert (words, plan) == ("", 0)
     _, words, plan = mesh_component(*given, first=1)
     assert (words, plan) == ("boundary not aligned", 1)
+
+
+def test_steps_go_the_way_in_which_they_are_apart() -> None:
+    rows = np.array([[1.0, 0, 0], [0, 1, 0]])
+    vectors = separate_vectors(np.diag([1.0, 0.9, 0.8]), np.array([-0.3, 0.1, 2.1]), rows, np.zeros(2))
+    assert vectors[0].tolist() == [-1, 0, 2]

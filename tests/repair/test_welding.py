@@ -139,3 +139,32 @@ def test_points_that_are_not_finite_are_named() -> None:
     points[4, 1] = float("nan")
     with pytest.raises(MeshError, match="not finite: vertices 4"):
         repair_mesh(points, PAIR)
+
+
+def apart(gap: float, size: float = 1.0, shift: float = 0.0) -> torch.Tensor:
+    """The vertices of the pair with the second triangle higher by a gap."""
+    vertices = SPLIT.clone()
+    vertices[3:, 2] += gap
+    return size * vertices + shift
+
+
+@pytest.mark.parametrize(
+    ("gap", "shift", "joined"),
+    [
+        (3e-7, 0.0, True),
+        (3e-6, 0.0, False),
+        (1e-4, 1e3, True),
+        (1e-3, 1e3, False),
+        (5e-3, 1e6, True),
+        (0.03, 1e6, False),
+    ],
+)
+def test_the_default_tolerance_is_rounding_to_single_precision_but_small_against_edges(
+    gap: float, shift: float, joined: bool
+) -> None:
+    assert (len(repair_mesh(apart(gap, shift=shift), PAIR, weld=True).vertices) == 4) == joined
+
+
+def test_the_distance_that_is_told_has_the_unit_of_the_input() -> None:
+    (message,) = repair_mesh(apart(0.25, 1000.0), PAIR, weld=300.0).messages
+    assert "at most 2.5e+02 away" in message

@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
     numbers, worst = diagnosis.counts(), diagnosis.worst_vertices(arguments.worst)
     advice = layout_advice(mesh.vertices, mesh.topology, diagnosis)
-    _explain(worst, mesh, _first_number(arguments.input))
+    _explain(worst, mesh)
     report = {
         **numbers,
         "file": arguments.input,
@@ -97,7 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(line)
     print(f"{arguments.input}\n{format_counts(numbers)}")
     if worst:
-        print(format_vertices(worst, _first_number(arguments.input)))
+        print(format_vertices(worst, mesh.names.first))
     if advice:
         print("\n".join(["", "advice", *(f"  {sentence}" for sentence in advice)]))
     print("".join(f"wrote {path}\n" for path in files), end="")
@@ -182,21 +182,16 @@ def _remedy_words(remedy: dict[str, Any] | None) -> str:
     return f"{remedy['words']}: bad stars here {remedy['bad_before']} -> {remedy['bad_after']}"
 
 
-def _first_number(name: str) -> int:
-    """From which number on the file counts its vertices."""
-    return int(Path(name).suffix.lower() == ".obj")
-
-
-def _explain(worst: list[dict[str, Any]], mesh: PolygonMesh, first_number: int) -> None:
+def _explain(worst: list[dict[str, Any]], mesh: PolygonMesh) -> None:
     """Adds to every vertex where it is, its number in the file, its pattern in words, and what it needs."""
     from ..measuring import pattern_words, star_remedy
 
     vertices = mesh.vertices.double()
     for row in worst:
         vertex = row["vertex"]
-        remedy = star_remedy(vertices, mesh.topology, vertex, first_number=first_number)
+        remedy = star_remedy(vertices, mesh.topology, vertex, names=mesh.names)
         row["position"] = vertices[vertex].tolist()
-        row["number_in_file"] = vertex + first_number
+        row["number_in_file"] = int(mesh.names.vertex(vertex))
         row["pattern_words"] = pattern_words(row["ordinary_pattern"], row["valence"])
         row["remedy"] = None if remedy is None else remedy.as_dict()
 

@@ -75,14 +75,14 @@ def carried(lines: str, marks: Tensor, step: Refinement) -> tuple[Tensor, str]:
     return fine, f"{int(marks.sum())} marked edges to {int(fine.sum())}: {words}"
 
 
-def read_marks(mesh: PolygonMesh, arguments: argparse.Namespace) -> tuple[Tensor | None, list[str]]:
-    """Marked edges (E,) of INPUT, None without; and what became of them, in words."""
+def read_marks(mesh: PolygonMesh, arguments: argparse.Namespace) -> Tensor | None:
+    """(E,) bool: marked edges of INPUT; None without."""
     from ..io import load_edge_labels
 
     file = marks_file(arguments)
     if file is None:
-        return None, []
-    return load_edge_labels(file, mesh.topology, vertex_map=mesh.vertex_map), []
+        return None
+    return load_edge_labels(file, mesh.topology, vertex_map=mesh.vertex_map)
 
 
 class MarkedOutputs(Outputs):

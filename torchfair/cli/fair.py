@@ -89,10 +89,9 @@ class FairCommand(JobCommand):
             "reference": read_reference(arguments),
             "handles": read_handles(arguments, mesh),
             "levels": arguments.levels,
+            "fixed": read_fixed(arguments, mesh),
         }
-        options["fixed"] = read_fixed(arguments, mesh)
-        marks, notes = read_marks(mesh, arguments)
-        return Request(mesh, options, notes=notes, marks=marks)
+        return Request(mesh, options, marks=read_marks(mesh, arguments))
 
 
 COMMAND = FairCommand()

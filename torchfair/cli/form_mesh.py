@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from .arguments import positive_count
 from .mesh import draw_singular, table
-from .outputs import Outputs, Request, Writer
+from .outputs import Outputs, Request, Writer, save_result
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
@@ -88,10 +88,8 @@ class FormOutputs(Outputs):
         return ""
 
     def _save(self, path: Path, request: Request, result: Any, overwrite: bool) -> None:
-        from ..io import save_mesh
-
         assert self._made is not None
-        save_mesh(path, self._made.vertices, self._made.topology, overwrite=overwrite)
+        request.notes += save_result(path, self._made.vertices, self._made.topology, request.mesh, force=overwrite)
 
     def _draw(self, path: Path, request: Request, result: Any, overwrite: bool) -> None:
         draw_singular(path, request, self._made, overwrite)

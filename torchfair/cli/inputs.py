@@ -57,13 +57,16 @@ def add_handles(parser: argparse.ArgumentParser) -> None:
 def read_handles(arguments: argparse.Namespace, mesh: PolygonMesh) -> dict[int, list[float]]:
     """Where ``--handle`` pulls vertices of a mesh, which are counted as in its file."""
     given = [_vertex_target(*words) for words in arguments.handle]
-    return {_in_mesh(vertex, mesh, "--handle"): place for vertex, place in given}
+    return {number_in_mesh(vertex, mesh, "--handle"): place for vertex, place in given}
 
 
-def _in_mesh(vertex: int, mesh: PolygonMesh, option: str) -> int:
+def number_in_mesh(vertex: int, mesh: PolygonMesh, option: str) -> int:
     """The number in a mesh of a vertex of its file, which an option names."""
-    if mesh.vertex_map is None or vertex >= len(mesh.vertex_map):
-        return vertex
+    if mesh.vertex_map is None:
+        return vertex  # the job refuses those that do not exist
+    if vertex >= len(mesh.vertex_map):
+        last = len(mesh.vertex_map) - 1
+        raise CommandError(f"{option}: vertices of the file are numbered 0 to {last}, got {vertex}")
     number = int(mesh.vertex_map[vertex])
     if number < 0:
         raise CommandError(f"{option}: vertex {vertex} is one that no face uses, and was dropped by --repair")
@@ -89,7 +92,7 @@ def _fixed_vertices(words: list[str], mesh: PolygonMesh) -> set[int]:
     kind, *rest = words
     try:
         if kind not in ("near", "box"):
-            return {_in_mesh(count(word), mesh, "--fix") for word in words}
+            return {number_in_mesh(count(word), mesh, "--fix") for word in words}
         numbers = [float(word) for word in rest]
         if len(numbers) != (3 if kind == "near" else 6) or not all(map(math.isfinite, numbers)):
             raise ValueError

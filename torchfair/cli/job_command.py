@@ -12,7 +12,7 @@ from .exit_codes import IN_WORDS, exit_code
 from .options import SettingOptions
 from .outputs import Outputs, Request, Writer, add_outputs, asked_for
 from .parser import CommandParser
-from .reading import in_numbers_of
+from .reading import in_numbers_of, read_report
 from .summary import kept_lines, measures_table, missed_lines, note_lines, work_lines
 
 if TYPE_CHECKING:
@@ -127,7 +127,5 @@ class JobCommand(ABC):
     ) -> dict[str, Any]:
         from ..formfinding import job_report
 
-        mesh = request.mesh
-        read = {"repairs": mesh.repairs, "input_notes": mesh.notes, "vertex_map": mesh.vertex_map}
-        own = {"job": self.job, "request": asked_for(arguments), **read, **request.report}
+        own = {"job": self.job, "request": asked_for(arguments), **read_report(request.mesh), **request.report}
         return {**own, **job_report(result, settings)}

@@ -17,7 +17,7 @@ from .mesh_planar import made_planar
 from .options import SettingOptions
 from .outputs import Outputs, Request, Writer, add_outputs, asked_for
 from .parser import CommandParser
-from .reading import in_numbers_of
+from .reading import in_numbers_of, read_report
 from .summary import note_lines
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def run(arguments: argparse.Namespace) -> int:
     outputs.write_mesh(request, made)
     notes = [*surface.notes, *made.notes, *request.notes]
     lines = [*note_lines(surface.repairs, notes, missed), *table(made.report)]
-    report = _report(arguments, made, settings, missed, time.perf_counter() - began)
+    report = _report(arguments, made, settings, missed, time.perf_counter() - began) | read_report(surface)
     outputs.finish(request, made, lines, report, missed)
     return exit_code(status, missed)
 

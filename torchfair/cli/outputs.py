@@ -129,6 +129,19 @@ class Outputs:
             writer(path, request, result, self.force)
 
 
+def not_held(path: Path, source: PolygonMesh, *, same: bool, marks: bool) -> list[str]:
+    """What of the file of a mesh another file does not hold, in words.
+
+    Args:
+        path: The other file.
+        source: The mesh that was read.
+        same: Whether the faces are those of the source.
+        marks: Whether line elements of the source are carried on.
+    """
+    left_out = "" if source.attributes is None else source.attributes.left_out(path.suffix.lower(), same, marks)
+    return [f"{path.name} does not hold {left_out} of the input"] if left_out else []
+
+
 def save_result(
     path: Path,
     vertices: Tensor,
@@ -158,9 +171,7 @@ def save_result(
     suffix, notes = path.suffix.lower(), []
     attributes = source.attributes
     same = topology.corners.equal(source.topology.corners) and topology.face_offsets.equal(source.topology.face_offsets)
-    if attributes is not None:
-        left_out = attributes.left_out(suffix, same, marks)
-        notes += [f"{path.name} does not hold {left_out} of the input"] if left_out else []
+    notes += not_held(path, source, same=same, marks=marks)
     if suffix in _TRIANGLES and not topology.is_triangular:
         from ..topology import Topology
         from ..triangulation import triangulate

@@ -69,6 +69,11 @@ def said_of(mesh: PolygonMesh, name: str | None = None) -> list[str]:
     return [*(f"{of}repaired: {sentence}" for sentence in mesh.repairs), *(f"{of}note: {note}" for note in mesh.notes)]
 
 
+def read_report(mesh: PolygonMesh) -> dict[str, Any]:
+    """The same for a report, with where vertices of the file have gone."""
+    return {"repairs": mesh.repairs, "input_notes": mesh.notes, "vertex_map": mesh.vertex_map}
+
+
 @contextmanager
 def in_numbers_of(mesh: PolygonMesh) -> Iterator[None]:
     """Errors name vertices and faces as the file of the mesh does."""

@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .arguments import non_negative, positive_count
-from .edge_marks import carried, file_of_marks, marks_file
+from .edge_marks import carried, file_of_marks, read_marks
 from .inputs import add_repair, read_input
 from .outputs import refuse_existing, refuse_unknown_format, save_result
 from .reading import in_numbers_of, said_of
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
-    from ..io import PolygonMesh
+    pass
 
 NAME = "torchfair subdivide"
 _DESCRIPTION = (
@@ -62,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     beside = file_of_marks(output)
     refuse_existing([output], force=arguments.force)
     mesh = read_input(arguments.input, arguments)
-    marks = _marks(arguments, mesh)
+    marks = read_marks(mesh, arguments)
     if marks is not None and beside is not None:
         refuse_existing([beside], force=arguments.force)
     numbers = output.with_suffix(".vertices.json")
@@ -97,13 +95,3 @@ def run(arguments: argparse.Namespace) -> int:
     counts = [f"{t.num_vertices} vertices, {t.num_faces} faces" for t in (mesh.topology, step.topology)]
     print("\n".join([*notes, f"{counts[0]} to {counts[1]}", *(f"wrote {path}" for path in written)]))
     return 0
-
-
-def _marks(arguments: argparse.Namespace, mesh: PolygonMesh) -> Tensor | None:
-    """(E,) bool: marked edges; None if there are none."""
-    from ..io import load_edge_labels
-
-    file = marks_file(arguments)
-    if file is None:
-        return None
-    return load_edge_labels(file, mesh.topology, vertex_map=mesh.vertex_map)

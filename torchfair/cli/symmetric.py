@@ -12,7 +12,7 @@ from .arguments import count
 from .edge_marks import file_of_marks
 from .inputs import add_handles, add_levels, add_reference, add_repair, read_handles, read_input, read_reference
 from .job_command import JobCommand
-from .outputs import Outputs, Request, Writer
+from .outputs import Outputs, Request, Writer, not_held
 from .pictures import draw_edges
 from .strips import StripFiles, add_strips
 from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edges, slide_warnings, vertex_mask
@@ -93,7 +93,9 @@ class SymmetricCommand(JobCommand):
         if mesh.topology.is_quadrangular:
             edges, vertices, notes = read_quads(arguments, mesh)
             settings = even_settings(self.options().asked(arguments), settings)
-            mesh = replace(mesh, vertices=vertices, topology=edges.topology, attributes=None)
+            notes += not_held(Path(arguments.output), mesh, same=False, marks=True)
+            names = replace(mesh.names, faces=None, face_lines=None)  # those of quads
+            mesh = replace(mesh, vertices=vertices, topology=edges.topology, attributes=None, names=names)
         else:
             edges, notes = read_principal_edges(arguments, mesh)
         options = {

@@ -10,6 +10,7 @@ from ..errors import MeshError
 from .arguments import count
 from .edge_marks import marks_file
 from .errors import CommandError
+from .inputs import number_in_mesh
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -68,7 +69,7 @@ def _chosen_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[Pri
         return edges, f"principal edges are parallel to ({v}, {w})"
     file = marks_file(arguments)
     if file is not None:
-        edges = PrincipalEdges(topology, load_edge_labels(file, topology))
+        edges = PrincipalEdges(topology, load_edge_labels(file, topology, vertex_map=mesh.vertex_map))
         own = arguments.labels is None  # marks of INPUT itself, such as those of torchfair mesh
         return (
             edges if allow or (own and _mostly_fit(edges)) else edges.check()
@@ -116,14 +117,15 @@ def slide_warnings(name: str, mesh: PolygonMesh, edges: PrincipalEdges) -> list[
 
 
 def vertex_mask(option: str, chosen: Sequence[int], mesh: PolygonMesh) -> Tensor:
-    """(V,) bool of chosen vertices."""
+    """(V,) bool of chosen vertices, which are counted as in the file of the mesh."""
     import torch
 
+    chosen = [number_in_mesh(vertex, mesh, option) for vertex in chosen]
     mask = torch.zeros(mesh.topology.num_vertices, dtype=torch.bool)
     wrong = [vertex for vertex in chosen if vertex >= len(mask)]
     if wrong:
         raise CommandError(f"{option}: vertices are numbered 0 to {len(mask) - 1}, got {wrong[0]}")
-    mask[list(chosen)] = True
+    mask[chosen] = True
     return mask
 
 
@@ -145,8 +147,9 @@ def joined_edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
 
     from .._graph import edge_numbers
 
-    vertex_mask("--seed", ends, mesh)
-    number = int(edge_numbers(mesh.topology, torch.tensor([list(ends)]))[0])
+    vertex_mask("--seed", ends, mesh)  # refuses what is no vertex
+    pair = torch.tensor([[number_in_mesh(end, mesh, "--seed") for end in ends]])
+    number = int(edge_numbers(mesh.topology, pair)[0])
     if number < 0:
         raise CommandError(f"--seed: vertices {ends[0]} and {ends[1]} are not joined by an edge")
     return number

@@ -46,7 +46,7 @@ def _seed(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[int | None,
     file = marks_file(arguments)
     if file is None:
         return None, "principal edges are the family of edges that bends less out of the surface"
-    marked = load_edge_labels(file, mesh.topology)
+    marked = load_edge_labels(file, mesh.topology, vertex_map=mesh.vertex_map)
     numbers = marked.nonzero().squeeze(1)
     if not numbers.numel():
         raise CommandError(f"--labels: {file} marks no edge")

@@ -9,12 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from .._ranges import ranges
 from ..errors import MeshFileError, TorchfairError
-from .obj import obj_words, statement_rows, vertex_numbers
+from .obj import obj_words, read_vertices, statement_rows, vertex_numbers
 from .raw_mesh import Floats
 from .reading import read_bytes
-from .text import to_floats
 
 _FINE = 1e-4  # of the extent of a drawing: chords of arcs and splines are as near to them
 _SAMPLES = 200  # of a curve in a 3DM file that is no polyline
@@ -27,8 +25,7 @@ def obj_pieces(path: Path) -> list[Floats]:
     vertex_rows, line_rows = statement_rows(path, text, (b"v",), (b"l",))
     if not line_rows.size:
         raise MeshFileError(path, "has no line elements (l) that could be a boundary curve")
-    first = text.starts[vertex_rows] + 1
-    points = to_floats(path, text, ranges(first, np.full_like(first, 3))).reshape(-1, 3)
+    points = read_vertices(path, text, vertex_rows)
     numbers, sizes = vertex_numbers(path, text, vertex_rows, line_rows, slashes=b"/" in data, what="a point of a line")
     if numbers.size and not (numbers.min() >= 0 and numbers.max() < len(points)):
         raise MeshFileError(path, f"a line element names a vertex that does not exist: there are {len(points)}")

@@ -44,7 +44,7 @@ def read_obj(path: Path, data: bytes) -> RawMesh:
     """
     text = obj_words(path, data)
     vertex_rows, face_rows = statement_rows(path, text, (b"v",), (b"f", b"fo"))
-    points = _read_vertices(path, text, vertex_rows)
+    points = read_vertices(path, text, vertex_rows)
     as_written = [text.words[i] for i in ranges(text.starts[face_rows] + 1, text.sizes[face_rows] - 1).tolist()]
     corners, sizes = vertex_numbers(path, text, vertex_rows, face_rows, slashes=b"/" in data)
     origin = Origin(path, text.lines[vertex_rows], text.lines[face_rows], first_index=1)
@@ -136,7 +136,8 @@ def vertex_numbers(
     return np.where((numbers < 0) & (known + numbers >= 0), known + numbers, numbers - 1), sizes
 
 
-def _read_vertices(path: Path, text: Words, rows: Ints) -> Floats:
+def read_vertices(path: Path, text: Words, rows: Ints) -> Floats:
+    """Positions (n, 3) of vertex statements, which stand in some rows."""
     sizes = text.sizes[rows] - 1
     wrong = np.flatnonzero(~np.isin(sizes, _VERTEX_SIZES))
     if wrong.size:

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from .._graph import edge_numbers
+from .._names import FROM_ZERO, Names
 from .._threads import threads_for
 from ..errors import MeshError, TorchfairError
 from ..geometry import edge_lengths, star_normals
@@ -45,7 +46,7 @@ class Remedy:
         return {"words": self.words, "bad_before": self.bad_before, "bad_after": self.bad_after}
 
 
-def star_remedy(vertices: Tensor, topology: Topology, vertex: int, *, first_number: int = 0) -> Remedy | None:
+def star_remedy(vertices: Tensor, topology: Topology, vertex: int, *, names: Names = FROM_ZERO) -> Remedy | None:
     """The slide of an inner vertex, or the flip of an edge beside it, after which least stars around it are bad.
 
     Slides go along the tangent plane, by up to a third of an edge; edges are flipped between triangles. Everything is
@@ -55,13 +56,13 @@ def star_remedy(vertices: Tensor, topology: Topology, vertex: int, *, first_numb
         vertices: (V, 3) float64.
         topology: any polygons.
         vertex: an inner vertex.
-        first_number: from which on vertices are counted in words; 1 as in OBJ files.
+        names: what vertices are called in words, such as ``names`` of a mesh that was read.
 
     Returns:
         None where nothing of that leaves fewer bad stars.
     """
     try:
-        patch = _Patch(vertices, topology, vertex, first_number)
+        patch = _Patch(vertices, topology, vertex, names)
     except MeshError:  # faces around it that touch in single vertices are no mesh
         return None
     trials = [_Trial("", patch.vertices, patch.faces), *patch.slides(), *patch.flips()]
@@ -84,8 +85,8 @@ class _Trial(NamedTuple):
 class _Patch:
     """The faces around a vertex and its neighbours, which hold all stars that change."""
 
-    def __init__(self, vertices: Tensor, topology: Topology, vertex: int, first_number: int) -> None:
-        self._first = first_number
+    def __init__(self, vertices: Tensor, topology: Topology, vertex: int, names: Names) -> None:
+        self._names = names
         start, stop = topology.ring_offsets[vertex : vertex + 2].tolist()
         self._judged = torch.cat([torch.tensor([vertex]), topology.ring_vertices[start:stop]])
         near = torch.isin(topology.corners, self._judged)
@@ -142,7 +143,7 @@ class _Patch:
             if int(edge_numbers(self.topology, torch.tensor([[a, b]]))[0]) >= 0:
                 continue
             faces = [face for i, face in enumerate(self.faces) if i not in (left, right)]
-            names = [self._first + int(self.numbers[i]) for i in (v, w, a, b)]
+            names = [self._names.vertex(int(self.numbers[i])) for i in (v, w, a, b)]
             words = "flip the edge {} {} to {} {}".format(*names)
             made.append(_Trial(words, self.vertices, [*faces, [v, b, a], [b, w, a]]))
         return made

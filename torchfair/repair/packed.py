@@ -53,12 +53,10 @@ def repair_packed(
     return _result(vertices, soup, flipped, used)
 
 
-def weld_packed(
-    vertices: Tensor, corners: Ints, offsets: Ints, weld: bool | float, *, split_edges: bool = False
-) -> RepairedMesh:
+def weld_packed(vertices: Tensor, corners: Ints, offsets: Ints, weld: bool | float) -> RepairedMesh:
     """Seams closed and nothing else; vertices that were not merged into others stay, used or not."""
     soup = _soup(vertices, corners, offsets)
-    soup = welded(soup, checked_tolerance(weld, soup), split_edges=split_edges)
+    soup = welded(soup, checked_tolerance(weld, soup), split_edges=False)
     kept = np.ones(len(soup.points), bool)
     kept[_merged_away(soup)] = False
     return _result(vertices, soup, np.zeros(len(soup.faces), bool), kept)
