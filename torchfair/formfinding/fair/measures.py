@@ -111,7 +111,7 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         promises.append(Promise("smallest angle", least, reached, "at least", "degrees", of_settings=asked))
         area = after["smallest_area_ratio"]
         promises.append(Promise("smallest area against its own", settings.smallest_area, area, "at least"))
-    if problem.largest_areas is not None:
+    if problem.bounds.largest_areas(problem.settings) is not None:
         growth, remedy = after["largest_growth"], "raise largest_area, or allow smaller areas"
         promises.append(Promise("growth of a face, by", settings.largest_area, growth, remedy=remedy))
     if not settings.faces_may_turn:

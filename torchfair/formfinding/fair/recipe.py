@@ -88,7 +88,7 @@ class FairRecipe(Recipe[FairSettings]):
     def take_settings(self, settings: FairSettings) -> None:
         """Takes other weights."""
         super().take_settings(settings)
-        self.problem.settings = settings
+        self.problem.take_settings(settings)
 
     def reconsider(self) -> None:
         """Where a handle leaves the reference surface, that is given up."""
