@@ -14,6 +14,7 @@ from ... import constraints as c
 from ...geometry import corner_angles, face_areas
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job.plan import Stage
 from ..job.pulls import Pulls
@@ -25,7 +26,6 @@ from .guard import FairGuard
 from .nearness import Nearness
 from .panel_sizes import growth_terms, own_sizes
 from .panels import Panels
-from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)
 _LEAST_SAFETY = math.radians(2.0)
