@@ -29,7 +29,7 @@ class DenoiseCommand(JobCommand):
 
     def settings(self) -> type[Any]:
         """See the base class."""
-        from ..formfinding import DenoiseSettings
+        from ..settings.denoise_settings import DenoiseSettings
 
         return DenoiseSettings
 

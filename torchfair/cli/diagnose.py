@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..io.json_text import to_json
 from .arguments import count
 from .errors import CommandError
 from .inputs import add_repair, read_input
@@ -91,6 +90,8 @@ def run(arguments: argparse.Namespace) -> int:
     if files:
         write(files, mesh, diagnosis, report, arguments)
     if arguments.json:
+        from ..io import to_json
+
         sys.stdout.write(to_json(report))
         return 0
     for line in said_of(mesh):
@@ -108,7 +109,7 @@ def write(
     files: list[Path], mesh: PolygonMesh, diagnosis: Diagnosis, report: dict[str, Any], arguments: argparse.Namespace
 ) -> None:
     """Writes report and pictures, each whole or not at all."""
-    from ..io import atomic_write_text
+    from ..io import atomic_write_text, to_json
 
     files[0].parent.mkdir(parents=True, exist_ok=True)
     atomic_write_text(files[0], to_json(report), overwrite=arguments.force)

@@ -59,7 +59,7 @@ class FairCommand(JobCommand):
 
     def settings(self) -> type[Any]:
         """See the base class."""
-        from ..formfinding import FairSettings
+        from ..settings.fair_settings import FairSettings
 
         return FairSettings
 

@@ -43,7 +43,7 @@ class FormCommand(JobCommand):
 
     def settings(self) -> type[Any]:
         """See the base class."""
-        from ..formfinding import FormSettings
+        from ..settings.form_settings import FormSettings
 
         return FormSettings
 

@@ -83,7 +83,7 @@ def fill(parser: CommandParser) -> None:
 
 def options() -> SettingOptions[MeshingSettings]:
     """The options that are settings."""
-    from ..meshing import MeshingSettings
+    from ..settings.meshing_settings import MeshingSettings
 
     return SettingOptions(MeshingSettings, "mesh", {})
 

@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..io.json_text import to_json
 from .arguments import count, positive_count, positive_or_none
 from .errors import CommandError
 from .exit_codes import EXIT_NOT_REACHED, EXIT_OK
@@ -84,6 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
         if files:
             write(files, mesh, score, report, arguments)
     if arguments.json:
+        from ..io import to_json
+
         sys.stdout.write(to_json(report))
         return _ended(report)
     for line in [*said_of(mesh), *(said_of(reference, arguments.reference) if reference else [])]:
@@ -144,7 +145,7 @@ def write(
     arguments: argparse.Namespace,
 ) -> None:
     """Writes report, pictures and turntable, each whole or not at all."""
-    from ..io import atomic_write_text
+    from ..io import atomic_write_text, to_json
 
     files[0].parent.mkdir(parents=True, exist_ok=True)
     atomic_write_text(files[0], to_json(report), overwrite=arguments.force)

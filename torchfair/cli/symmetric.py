@@ -54,7 +54,7 @@ class SymmetricCommand(JobCommand):
 
     def settings(self) -> type[Any]:
         """See the base class."""
-        from ..formfinding import SymmetricSettings
+        from ..settings.symmetric_settings import SymmetricSettings
 
         return SymmetricSettings
 

@@ -11,10 +11,10 @@ from ... import constraints as c
 from ...geometry import dihedral_angles
 from ...geometry.planarity import planarity
 from ...projection import ElementTerm
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from .flat_edges import edges_to_keep_flat
 from .planar_faces import NearlyPlanar, faces_to_keep_planar
-from .settings import FairSettings
 
 PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
 _PLANAR_ENOUGH = 5e-5

@@ -13,6 +13,7 @@ from torch import Tensor
 from ... import constraints as c
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job.plan import Stage
 from ..job.pulls import Pulls
@@ -24,7 +25,6 @@ from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
 from .panels import Panels
-from .settings import FairSettings
 
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8

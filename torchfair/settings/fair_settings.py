@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
-from ..._numbers import check_number, is_number
-from ...errors import SettingsError
-from ...projection import ProjectionSettings
-from ...settings import setting
-from ..checks import check_choice, check_weights
-from ..printed import printed_projection
+from .._numbers import check_number, is_number
+from ..errors import SettingsError
+from .checks import check_choice, check_weights
+from .printed import printed_projection
+from .projection_settings import ProjectionSettings
+from .setting import setting
 
 Boundary = Literal["glide", "fixed", "free"]
 Planar = Literal["keep", "quads", "none"]
