@@ -10,10 +10,10 @@ from torch import Tensor
 from ... import constraints as c
 from ...geometry import corner_angles, face_areas
 from ...projection import ElementTerm
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job.pulls import Pulls
 from .panel_sizes import growth_terms, own_sizes
-from .settings import FairSettings
 
 _SAFE_ANGLE = math.radians(25.0)  # from where on the barrier of angles is silent
 _LEAST_SAFETY = math.radians(2.0)
