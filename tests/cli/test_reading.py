@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from helpers import wavy_grid
+from helpers import report_in, wavy_grid
 
 from torchfair.cli.command import build_parser, main
 from torchfair.cli.reading import with_default_tolerance
@@ -58,7 +58,7 @@ def test_the_map_of_vertices_is_written(seam: str, tmp_path: Path, capsys: pytes
     output = tmp_path / "new" / "roof.obj"
     assert main(["fair", seam, "--weld", "-o", str(output), "--no-pictures"]) == 0
     assert "repaired: welded 2 vertex(es)" in capsys.readouterr().out
-    assert json.loads((output.parent / "report.json").read_text())["vertex_map"] == [0, 1, 2, 0, 2, 3]
+    assert report_in(output.parent)["vertex_map"] == [0, 1, 2, 0, 2, 3]
     assert load_mesh(output).topology.face_lists() == [[0, 1, 2], [0, 2, 3]]
 
 
@@ -192,6 +192,6 @@ def test_what_meshing_has_read_is_in_its_report(tmp_path: Path) -> None:
     path.write_text("\n".join(saddle_lines()) + "\n")
     words = ["mesh", str(path), "-o", str(tmp_path / "o.obj"), "--quads", "30", "--repair", "--no-pictures"]
     assert main(words) in (0, 1)
-    report = json.loads((tmp_path / "report.json").read_text())
+    report = report_in(tmp_path)
     assert report["repairs"]
     assert report["vertex_map"][:3] == [-1, 0, 1]

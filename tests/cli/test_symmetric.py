@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import pytest
 import torch
 from geometry_meshes import mixed_grid
+from helpers import report_in
 
 from torchfair import Topology
 from torchfair.cli import main
@@ -50,14 +50,14 @@ def test_everything_is_written_and_holds(torus: Path, capsys: pytest.CaptureFixt
     edges = PrincipalEdges(fine.topology, load_edge_labels(output, fine.topology)).check()
     for values in condition_residuals(fine.vertices, edges, edges.stars()).values():
         assert float(values.max()) < 1e-8
-    report = json.loads((output.parent / "report.json").read_text())
+    report = report_in(output.parent)
     assert [level["vertices"] for level in report["levels"]] == [80, 320]
     assert report["levels"][1]["after"]["crossing_pyramids_negative"] == 0
     assert report["strips"]["largest_isometry_error"] < 1e-6
     assert report["energies"]["after"]["largest_cospherical"] < 1e-8
-    assert load_mesh(output.parent / "strips.obj").topology.num_faces == report["strips"]["quads"]
-    assert (output.parent / "strips.svg").read_text().startswith("<svg")
-    for name in ("principal.png", "edges.png"):
+    assert load_mesh(output.with_suffix(".strips.obj")).topology.num_faces == report["strips"]["quads"]
+    assert (output.with_suffix(".strips.svg")).read_text().startswith("<svg")
+    for name in (f"{output.stem}.principal.png", f"{output.stem}.edges.png"):
         assert (output.parent / name).read_bytes().startswith(b"\x89PNG")
 
 
@@ -90,7 +90,7 @@ def test_conditions_on_one_polyline(torus: Path) -> None:
     output = torus.parent / "one.obj"
     words = [str(torus), "-o", str(output), "--on", "12", "--energy", "0.1", "--no-pictures", "--steps", "40"]
     assert main(["symmetric", *words]) == 0
-    report = json.loads((torus.parent / "report.json").read_text())
+    report = report_in(torus.parent)
     assert report["levels"][0]["after"]["stars"] == 10
 
 
@@ -165,7 +165,7 @@ def test_quads_are_cut_into_triangles(tmp_path: Path, capsys: pytest.CaptureFixt
         edges = PrincipalEdges(made.topology, load_edge_labels(output, made.topology)).check()
         found = {frozenset(pair) for pair in made.topology.edges[edges.mask].tolist()}
         assert number > 2 or found == {frozenset(pair) for pair in mesh.topology.edges[circles].tolist()}
-        report = json.loads((output.parent / "report.json").read_text())
+        report = report_in(output.parent)
         weights[number] = report["settings"]["evenness_weight"]
         assert report["holds"] == (number <= 2)
     assert weights == {0: 3.0, 1: 3.0, 2: 0.0, 3: 0.0, 4: 3.0}
@@ -209,7 +209,7 @@ def test_strips_on_sheets_in_millimetres(torus: Path, capsys: pytest.CaptureFixt
     sheet = ["--strips", "0.2", "--millimetres", "100", "--sheet-width", "700", "--sheet-height", "300", "--gap", "4"]
     assert main(["symmetric", str(torus), "-o", str(output), "--no-pictures", *sheet]) == 0
     out = capsys.readouterr().out
-    report = json.loads((output.parent / "report.json").read_text())["strips"]
+    report = report_in(output.parent)["strips"]
     assert report["sheets"] > 1
     assert (report["sheet_width_millimetres"], report["sheet_height_millimetres"]) == pytest.approx((700.0, 300.0))
     assert f"on {report['sheets']} sheets of 700 x 300 mm" in out

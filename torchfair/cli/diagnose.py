@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from .arguments import count
 from .errors import CommandError
 from .inputs import add_repair, read_input
-from .outputs import refuse_existing
 from .reading import said_of
+from .told_files import told_files, written_with_report
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
@@ -57,7 +57,9 @@ def add_parser(subparsers: Any) -> None:
     add("--json", action="store_true", help="print one JSON object instead of tables")
     add("--per-vertex", action="store_true", help="with --json or --output: list the class of every vertex")
     add("--worst", type=count, default=10, metavar="N", help="list the N worst vertices (default 10)")
-    add("-o", "--output", metavar="FOLDER", help=f"folder for {REPORT} and pictures; nothing is written without it")
+    add(
+        "-o", "--output", metavar="FOLDER", help=f"folder for NAME.{REPORT} and pictures; nothing is written without it"
+    )
     add("--vertex", type=count, action="append", default=[], metavar="V", help="draw the normal pyramid of this vertex "
         "(counted from 0); repeatable; by default of the worst, then of some of each class")  # fmt: skip
     add("--no-pictures", action="store_true", help="write no pictures")
@@ -108,20 +110,22 @@ def run(arguments: argparse.Namespace) -> int:
 def write(
     files: list[Path], mesh: PolygonMesh, diagnosis: Diagnosis, report: dict[str, Any], arguments: argparse.Namespace
 ) -> None:
-    """Writes report and pictures, each whole or not at all."""
-    from ..io import atomic_write_text, to_json
+    """Writes report and pictures, all or nothing."""
+    with written_with_report(files, report, arguments):
+        if len(files) > 1:
+            _draw(files[1:], mesh, diagnosis, report, arguments)
 
-    files[0].parent.mkdir(parents=True, exist_ok=True)
-    atomic_write_text(files[0], to_json(report), overwrite=arguments.force)
-    if len(files) == 1:
-        return
+
+def _draw(
+    files: list[Path], mesh: PolygonMesh, diagnosis: Diagnosis, report: dict[str, Any], arguments: argparse.Namespace
+) -> None:
     from ..io import save_mesh
     from ..viewing.picture_gauss_image import picture_gauss_image
     from ..viewing.picture_pyramids import picture_pyramids
     from ..viewing.picture_star_classes import picture_star_classes, star_class_colors
 
     vertices, topology, classes, crossings = mesh.vertices, mesh.topology, diagnosis.classes, diagnosis.crossings
-    overview, pyramids, sphere, colored = files[1:]
+    overview, pyramids, sphere, colored = files
     picture_star_classes(overview, vertices, classes, crossings, overwrite=arguments.force)
     chosen = arguments.vertex or _instructive(diagnosis, report["worst_vertices"])
     picture_pyramids(pyramids, vertices, classes, crossings, chosen, overwrite=arguments.force)
@@ -204,9 +208,7 @@ def _files(arguments: argparse.Namespace) -> list[Path]:
             raise CommandError("--vertex draws a picture and needs a folder for it: --output FOLDER")
         return []
     pictures = () if arguments.no_pictures else (*PICTURES, COLORED)
-    files = [Path(arguments.output) / name for name in (REPORT, *pictures)]
-    refuse_existing(files, force=arguments.force)
-    return files
+    return told_files(arguments, (REPORT, *pictures))
 
 
 def _check_vertices(chosen: list[int], mesh: PolygonMesh) -> None:

@@ -48,7 +48,7 @@ class FairCommand(JobCommand):
     purpose = "make a mesh look smoother"
     description = (
         "Lowers the normal variation E of a polygon mesh by sliding its vertices along the surface, and writes the "
-        "mesh, report.json and pictures of before and after. Lengths are in mean edge lengths of the input."
+        "mesh, a report and pictures of before and after. Lengths are in mean edge lengths of the input."
     )
     option_names: ClassVar[Mapping[str, str]] = {"distance_limit": "distance"}
     pictures: ClassVar[Mapping[str, Writer]] = {

@@ -97,13 +97,13 @@ class JobCommand(ABC):
         outputs.prepare()
         request = self.read(arguments, settings)
         settings = request.settings or settings
-        outputs.make_folders()
+        outputs.make_folders(request.mesh, getattr(arguments, "levels", 0))
         for warning in request.warnings:
             print(f"{self.name}: warning: {warning}", file=sys.stderr, flush=True)
         mesh = request.mesh
         with in_numbers_of(mesh):
             result = self._solve(request, settings)
-        outputs.write_mesh(request, result)
+        outputs.save(request, result, lambda: self._report(arguments, request, result, settings))
         missed = [*missed_lines(result, getattr(arguments, "levels", 0)), *request.missed]
         lines = [
             *note_lines(mesh.repairs, [*mesh.notes, *request.notes, *result.notes], missed),
@@ -112,7 +112,7 @@ class JobCommand(ABC):
             *work_lines(result),
             *outputs.lines(),
         ]
-        outputs.finish(request, result, lines, self._report(arguments, request, result, settings), missed)
+        outputs.finish(request, result, lines, missed)
         return exit_code(result.projection.status, missed, interrupted=request.interrupted)
 
     def _solve(self, request: Request, settings: Any) -> JobResult[Any]:

@@ -8,12 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from ..errors import TorchfairError
 from .arguments import count
-from .edge_marks import file_of_marks
+from .edge_marks import end_of_marks
 from .inputs import add_handles, add_levels, add_reference, add_repair, read_handles, read_input, read_reference
 from .job_command import JobCommand
-from .outputs import Outputs, Request, Writer, not_held
+from .outputs import Outputs, Request, Writer
 from .pictures import draw_edges
+from .result_files import not_held
 from .strips import StripFiles, add_strips
 from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edges, slide_warnings, vertex_mask
 from .symmetric_quads import even_settings, read_quads
@@ -107,7 +109,8 @@ class SymmetricCommand(JobCommand):
         }
         keeps_shape = not (settings.free or handles or options["reference"])
         warnings = slide_warnings(arguments.input, mesh, edges) if keeps_shape else []
-        return Request(mesh, options, (mesh.vertices, edges), notes, warnings, settings)
+        report = {"strips": None}
+        return Request(mesh, options, (mesh.vertices, edges), notes, warnings, settings, report=report)
 
     def most_steps(self, settings: Any) -> int:
         """Those of a level."""
@@ -124,15 +127,20 @@ class SymmetricOutputs(Outputs):
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
         super().__init__(arguments, pictures)
         self._strips = StripFiles(arguments)
-        self.others = self._strips.files(self.folder)
-        beside = file_of_marks(self.mesh)
+        self.others = self._strips.files()
+        beside = end_of_marks(self.mesh)
         self.beside = {} if beside is None else {beside: _labels}
 
-    def write_mesh(self, request: Request, result: Any) -> None:
-        """Makes the strips too, so that the report can say how true they are."""
-        super().write_mesh(request, result)
-        level = result.levels[-1]
-        made = self._strips.make(level.vertices, level.principal.polylines(), level.normals)
+    def more(self, request: Request, result: Any) -> bool:
+        """Makes the strips, so that the report can say how true they are."""
+        if not self.others:
+            return False
+        level, made = result.levels[-1], {}
+        try:
+            made = self._strips.make(level.vertices, level.principal.polylines(), level.normals)
+        except TorchfairError as error:
+            self.others = {}
+            request.missed.append(f"strips: NOT REACHED; {error}")
         request.report["strips"] = made or None
         if made:
             request.notes.append(
@@ -140,6 +148,7 @@ class SymmetricOutputs(Outputs):
                 f"to {made['largest_isometry_error']:.2g}, on {made['sheets']} sheet{'s' * (made['sheets'] != 1)} of "
                 f"{made['sheet_width_millimetres']:.5g} x {made['sheet_height_millimetres']:.5g} mm"
             )
+        return True
 
     def polylines(self, result: Any) -> Sequence[Tensor]:
         """Principal edges, unless they stand in a file beside."""

@@ -38,7 +38,7 @@ def read_settings(path: str | os.PathLike[str], kind: type[S], *, job: str | Non
 
     Example::
 
-        settings = read_settings("smooth/report.json", FairSettings)
+        settings = read_settings("smooth/roof.report.json", FairSettings)
     """
     return _made(read_fields(path, kind, job=job), kind, os.fspath(path))
 
