@@ -59,7 +59,7 @@ def test_pictures_and_report_are_written_once(
     stars_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "out"
-    command = ["diagnose", stars_file, "-o", str(folder), "--vertex", "0", "--vertex", "7"]
+    command = ["diagnose", stars_file, "-o", str(folder), "--vertex", "1", "--vertex", "8"]
     assert main(command) == 0
     names = {
         f"stars.{end}" for end in ("diagnosis.json", "classes.png", "pyramids.png", "gauss_image.png", "classes.ply")
@@ -82,10 +82,10 @@ def test_pictures_and_report_are_written_once(
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        (["--vertex", "0"], "--output"),
-        (["--vertex", "1", "-o", "out"], "not inside"),
-        (["--vertex", "1000", "-o", "out"], "0 to 139"),
-        (["--vertex", "-1", "-o", "out"], "'-1'"),
+        (["--vertex", "1"], "--output"),
+        (["--vertex", "2", "-o", "out"], "--vertex 2: it is not inside"),
+        (["--vertex", "1000", "-o", "out"], "1 to 140"),
+        (["--vertex", "-1", "-o", "out"], "got -1"),
     ],
 )
 def test_wrong_vertices_are_refused(

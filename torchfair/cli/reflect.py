@@ -23,6 +23,7 @@ REPORT = "reflection.json"
 PICTURES = ("views.png", "differences.png")
 TURNTABLE = "turntable.gif"
 _LEAST_SIZE = 16
+_LARGEST_FRAME = 256
 _DESCRIPTION = (
     "Renders a polygon mesh as a mirror, every face plane, among stripes, and compares the pictures with those of a "
     "smooth surface: the reference, or the same mesh smoothly shaded. The score is 1 - SSIM, averaged over views and "
@@ -160,7 +161,8 @@ def write(
         with frame_progress(arguments.frames, "turntable") as progress:
             turntable(
                 film, mesh.vertices, mesh.topology, score.setup.reference,
-                frames=arguments.frames, progress=progress, overwrite=arguments.force,
+                frames=arguments.frames, size=min(arguments.size, _LARGEST_FRAME), progress=progress,
+                overwrite=arguments.force,
             )  # fmt: skip
 
 

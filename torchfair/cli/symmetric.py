@@ -9,12 +9,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..errors import TorchfairError
-from .arguments import count
+from .chosen_vertices import NUMBERS, ChosenVertices
 from .edge_marks import end_of_marks
-from .inputs import add_handles, add_levels, add_reference, add_repair, read_handles, read_input, read_reference
+from .inputs import (
+    add_fixed,
+    add_handles,
+    add_levels,
+    add_reference,
+    add_repair,
+    read_fixed,
+    read_handles,
+    read_input,
+    read_reference,
+)
 from .job_command import JobCommand
 from .outputs import Outputs, Request, Writer
 from .pictures import draw_edges
+from .reading import in_numbers_of
 from .result_files import not_held
 from .strips import StripFiles, add_strips
 from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edges, slide_warnings, vertex_mask
@@ -76,10 +87,10 @@ class SymmetricCommand(JobCommand):
         )
         add_labels(parser)
         add_handles(parser)
-        add("--fix", nargs="+", type=count, default=[], metavar="VERTEX", help="vertices that keep their places")
+        add_fixed(parser)
         add_reference(parser, "mesh of a surface to stay close to")
-        add("--on", nargs="+", type=count, default=[], metavar="VERTEX", help="impose the conditions only on the "
-            "principal polylines through these vertices")  # fmt: skip
+        add("--on", action="append", default=[], metavar="VERTEX ...", help="impose the conditions only on the "
+            f"principal polylines through these vertices: {NUMBERS}, or 'near X Y Z'")  # fmt: skip
         add_levels(parser)
         add_strips(parser)
         add_repair(parser)
@@ -91,25 +102,29 @@ class SymmetricCommand(JobCommand):
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class; quads are cut into triangles."""
         mesh = read_input(arguments.input, arguments)
-        handles = read_handles(arguments, mesh)
+        chosen = ChosenVertices(mesh)
+        handles, fixed = read_handles(arguments, chosen), read_fixed(arguments, chosen)
+        on = [vertex for words in arguments.on for vertex in chosen.of("--on", words)]
         if mesh.topology.is_quadrangular:
-            edges, vertices, notes = read_quads(arguments, mesh)
+            with in_numbers_of(mesh):
+                edges, vertices, notes = read_quads(arguments, chosen)
             settings = even_settings(self.options().asked(arguments), settings)
             notes += not_held(Path(arguments.output), mesh, same=False, marks=True)
             names = replace(mesh.names, faces=None, face_lines=None)  # those of quads
             mesh = replace(mesh, vertices=vertices, topology=edges.topology, attributes=None, names=names)
         else:
-            edges, notes = read_principal_edges(arguments, mesh)
+            edges, notes = read_principal_edges(arguments, chosen)
         options = {
             "handles": handles,
-            "fixed": vertex_mask("--fix", arguments.fix, mesh),
+            "fixed": vertex_mask(fixed, mesh),
             "reference": read_reference(arguments),
-            "on": polyline_vertices(arguments.on, mesh, edges) if arguments.on else None,
+            "on": polyline_vertices(on, mesh, edges) if on else None,
             "levels": arguments.levels,
         }
         keeps_shape = not (settings.free or handles or options["reference"])
         warnings = slide_warnings(arguments.input, mesh, edges) if keeps_shape else []
         report = {"strips": None}
+        notes = [*chosen.notes, *notes]
         return Request(mesh, options, (mesh.vertices, edges), notes, warnings, settings, report=report)
 
     def most_steps(self, settings: Any) -> int:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from ..._names import few_groups, sentence
 from ...energies import angle_variation, normal_variation, total_absolute_curvature, total_mean_curvature
 from ...geometry import corner_angles, edge_lengths, face_areas, face_normals
 from ...geometry.closest_point import ReferenceSurface
@@ -140,9 +141,10 @@ def located(promises: Sequence[Promise], vertices: Tensor, problem: FairProblem)
     warps = problem.panels.warps(vertices)
     order = torch.argsort(warps, descending=True, stable=True)[: int((warps > PLANAR_PROMISE).sum())]
     named = [
-        f"{face} ({warp:.2g})" for face, warp in zip(problem.panels.planar[order[:5]], warps[order[:5]], strict=True)
+        (("face", face), f" ({warp:.2g})")
+        for face, warp in zip(problem.panels.planar[order[:5]].tolist(), warps[order[:5]].tolist(), strict=True)
     ]
-    where = f"{len(order)} of {len(warps)}, counted from 0: {', '.join(named)}" + ", ..." * (len(order) > 5)
+    where = sentence(f"{len(order)} of {len(warps)}: faces ", few_groups(named, len(order)))
     return [replace(p, where=where) if p.name == _OF_PANELS and len(order) else p for p in promises]
 
 
