@@ -26,6 +26,7 @@ from .nearness import Nearness
 from .panel_sizes import growth_terms, own_sizes
 from .panels import Panels
 from .settings import FairSettings
+from .short_sides import ShortSides
 
 _SAFE_ANGLE = math.radians(25.0)
 _LEAST_SAFETY = math.radians(2.0)
@@ -53,6 +54,7 @@ class FairProblem:
         input_edge: Mean edge length of the input.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
         panels: Faces that are kept planar and edges that are kept flat.
+        sides: Edges of polygons, which do not become too short.
         loose: (V,) bool, corners of boundary and creases that become planar faces may take along.
         most_warped: Relative planarity that no face may exceed that should be planar but cannot become so.
         distance_for_planarity: How far planar faces may take the mesh from the reference, in mean edges of the input.
@@ -80,6 +82,7 @@ class FairProblem:
         self.corners = self._curves.rim.corners
         self._tell_of_creases()
         self.panels = Panels(vertices, topology, settings, self.notes)
+        self.sides = ShortSides.of(vertices, topology)
         self.loose = self._loose_corners()
         self.boundary = self._gliding_boundary()
         self.most_warped, self.distance_for_planarity = math.inf, 0.0
@@ -316,6 +319,7 @@ class FairProblem:
             *c.face_area_terms(
                 self.topology, face_areas(self.vertices, self.topology), smallest=settings.smallest_area, weight=weight
             ),
+            *self.sides.terms(self.topology, settings.smallest_edge, weight=weight),
         ]
 
     @property
@@ -361,6 +365,8 @@ class FairProblem:
             self.placed,
             smallest_angle=bounded * self._smallest_angle,
             smallest_area=bounded * self.settings.smallest_area,
+            sides=self.sides,
+            smallest_edge=bounded * self.settings.smallest_edge,
             largest_areas=self.largest_areas,
             from_last=self.near.design_mode or self.pulls.everywhere,
             may_turn=self.pulls.everywhere or self.settings.faces_may_turn,
