@@ -19,6 +19,8 @@ LABELS = {
     "area": "area",
     "largest_face_area": "largest face area",
     "longest_edge": "longest edge",
+    "shortest_edge": "shortest edge",
+    "smallest_edge_ratio": "shortest side of a polygon over its own at the start",
     "smallest_angle_degrees": "smallest angle, degrees",
     "smallest_area_ratio": "smallest face area over its own at the start",
     "largest_area_ratio": "largest face area over its own at the start",

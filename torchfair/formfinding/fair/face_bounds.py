@@ -1,4 +1,4 @@
-"""Bounds on corner angles and areas of faces in the job that lowers E, as barriers and as numbers."""
+"""Bounds on corner angles, areas and sides of faces in the job that lowers E, as barriers and as numbers."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job.pulls import Pulls
 from .panel_sizes import growth_terms, own_sizes
+from .short_sides import ShortSides
 
 _SAFE_ANGLE = math.radians(25.0)  # from where on the barrier of angles is silent
 _LEAST_SAFETY = math.radians(2.0)
@@ -26,10 +27,14 @@ class FaceBounds:
         vertices: (V, 3) start.
         topology: Its connectivity.
         pulls: Handles, which may stretch faces as they need.
+
+    Attributes:
+        sides: Sides of polygons, which must not collapse.
     """
 
     def __init__(self, vertices: Tensor, topology: Topology, pulls: Pulls) -> None:
         self._vertices, self._topology, self._pulls = vertices, topology, pulls
+        self.sides = ShortSides.of(vertices, topology)
 
     def smallest_angle(self, settings: FairSettings) -> float:
         """Radians that no corner angle falls below: that of the start where it is smaller than asked."""
@@ -51,6 +56,7 @@ class FaceBounds:
             *([] if most is None else growth_terms(self._topology, most, weight=weight)),
             *c.corner_angle_terms(self._topology, smallest, safe, weight=weight),
             *c.face_area_terms(self._topology, areas, smallest=settings.smallest_area, weight=weight),
+            *self.sides.terms(self._topology, settings.smallest_edge, weight=weight),
         ]
 
     @cached_property

@@ -340,6 +340,8 @@ class FairProblem:
             self.placed,
             smallest_angle=bounded * self.bounds.smallest_angle(self.settings),
             smallest_area=bounded * self.settings.smallest_area,
+            sides=self.bounds.sides,
+            smallest_edge=bounded * self.settings.smallest_edge,
             largest_areas=self.bounds.largest_areas(self.settings),
             from_last=self.near.design_mode or self.pulls.everywhere,
             may_turn=self.pulls.everywhere or self.settings.faces_may_turn,
