@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import shutil
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -188,6 +189,32 @@ def test_ctrl_c_while_pictures_are_drawn_says_which_are_missing(
     assert folder.names() == ALL - {"roof.two.png"}
     out = capsys.readouterr().out
     assert f"not written: {folder.out / 'roof.two.png'}\nnot written: {folder.out / 'roof.three.png'}" in out
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX systems")
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+def test_a_signal_between_the_job_and_its_files_costs_pictures_only(
+    folder: Folder, name: str, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The best mesh is known and not yet written: no moment loses it."""
+    number = getattr(signal, name)
+    handler = signal.getsignal(number)
+    assert folder.run(meanwhile=lambda: signal.raise_signal(number)) == code
+    assert folder.names() == {"roof.obj", "roof.report.json"}
+    assert f"not written: {folder.out / 'roof.one.png'}" in capsys.readouterr().out
+    assert signal.getsignal(number) is handler
+    assert folder.run("--force") == 0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX systems")
+def test_signals_that_are_ignored_stay_so(folder: Folder) -> None:
+    """As with nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        assert folder.run(meanwhile=lambda: signal.raise_signal(signal.SIGHUP)) == 0
+        assert folder.names() == ALL
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def links(out: Path) -> dict[str, Callable[[], object]]:

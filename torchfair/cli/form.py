@@ -15,6 +15,7 @@ from .inputs import add_handles, add_levels, add_repair, read_handles
 from .job_command import JobCommand
 from .outputs import Request, Writer
 from .pictures import draw_edges
+from .several import add_inputs
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
@@ -57,8 +58,8 @@ class FormCommand(JobCommand):
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh or curves, and points to pass through."""
         add = parser.add_argument
-        add("input", metavar="INPUT", nargs="?", help="mesh file to start from, or a built-in example:NAME; left out, "
-            "a start is made from the curves")  # fmt: skip
+        words = "mesh file to start from, or a built-in example:NAME; left out, a start is made from the curves"
+        add_inputs(parser, words, needed=False)
         add("--curve", action="append", default=[], metavar="FILE", help="closed boundary curve: a text file with x y "
             "z, or x y z and a normal, in every line; or the curves of an OBJ (line elements), DXF or 3DM file; one "
             "curve for a disk, two for an annulus, more for more holes; repeatable")  # fmt: skip

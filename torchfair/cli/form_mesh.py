@@ -68,7 +68,7 @@ class FormOutputs(Outputs):
         from ..meshing import principal_quads
         from ..projection import Status
 
-        if result.projection.status is Status.INTERRUPTED:
+        if request.interrupted or result.projection.status is Status.INTERRUPTED:
             return "interrupted before"
         try:
             self._made = made = principal_quads(result.vertices, result.topology, count=count)

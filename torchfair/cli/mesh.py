@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._interrupts import deferred_interrupts
 from .arguments import positive_count
 from .edge_marks import end_of_marks
 from .errors import CommandError
@@ -18,6 +19,7 @@ from .options import SettingOptions
 from .outputs import Outputs, Request, Writer, add_outputs, asked_for
 from .parser import CommandParser
 from .reading import in_numbers_of, read_report
+from .several import add_inputs
 from .summary import note_lines
 
 if TYPE_CHECKING:
@@ -71,7 +73,7 @@ def add_parser(subparsers: Any) -> None:
 def fill(parser: CommandParser) -> None:
     """Adds the arguments."""
     add = parser.add_argument
-    add("input", metavar="INPUT", help="mesh file of a surface, or a built-in example:NAME")
+    add_inputs(parser, "mesh file of a surface, or a built-in example:NAME")
     add_repair(parser)
     add("--quads", type=positive_count, metavar="N", help="about so many quads")
     add("--triangles", type=positive_count, metavar="N", help="about so many triangles, with principal edges")
@@ -103,12 +105,13 @@ def run(arguments: argparse.Namespace) -> int:
     with in_numbers_of(surface):
         made = _made(surface, arguments, settings)
     missed: list[str] = []
-    status = None
-    if arguments.planar:
-        made, missed, status = made_planar(made, surface)
-    request, seconds = Request(surface, {}), time.perf_counter() - began
-    report = _report(arguments, made, settings, missed, seconds) | read_report(surface)
-    outputs.save(request, made, lambda: report)
+    status, request = None, Request(surface, {})
+    with deferred_interrupts() as interrupts:
+        if arguments.planar:
+            made, missed, status = made_planar(made, surface, quiet=getattr(arguments, "quiet", False))
+        report = _report(arguments, made, settings, missed, time.perf_counter() - began) | read_report(surface)
+        outputs.save(request, made, lambda: report)
+        request.interrupted = interrupts.pending
     notes = [*surface.notes, *made.notes, *request.notes]
     lines = [*note_lines(surface.repairs, notes, missed), *table(made.report)]
     outputs.finish(request, made, lines, missed)

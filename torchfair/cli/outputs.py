@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._interrupts import deferred_interrupts
 from ..errors import TorchfairError
 from .elsewhere import places
 from .errors import CommandError
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..io import PolygonMesh
 
-_NOT_ASKED = ("run", "name", "version")
+_NOT_ASKED = ("run", "name", "version", "quiet")
 _BYTES = 200  # of a vertex and its faces as text, about
 _BYTES_OF_OTHERS = 1_000_000  # of a report or a picture
 
@@ -41,7 +40,7 @@ class Request:
         settings: To solve with; by default those that options ask for.
         report: Entries of the report beside those that all jobs have.
         missed: What was asked for beside the job and is not there, in words.
-        interrupted: Whether what comes after the job was interrupted.
+        interrupted: Whether the job was interrupted too late for that to change it, or what comes after it was.
     """
 
     mesh: PolygonMesh
@@ -122,11 +121,16 @@ class Outputs:
     # ---- after it --------------------------------------------------------------------------------------
 
     def save(self, request: Request, result: Any, report: Report) -> None:
-        """Writes what must not be lost, then makes more and writes that with the report; Ctrl-C waits meanwhile."""
-        with deferred_interrupts():
-            self._keep(request, result, report)
-        if self.more(request, result):
-            self._attempt(partial(self._together, self.late, request, result, report), self.report)
+        """Writes what must not be lost; to be called where Ctrl-C waits."""
+        self._keep(request, result, report)
+
+    def save_more(self, request: Request, result: Any, report: Report) -> None:
+        """Makes what takes long and writes it, with the report anew."""
+        try:
+            if self.more(request, result):
+                self._attempt(partial(self._together, self.late, request, result, report), self.report)
+        except KeyboardInterrupt:
+            request.interrupted = True
 
     def more(self, request: Request, result: Any) -> bool:
         """Makes what takes long once the mesh is safe; whether the report has to be written anew."""
@@ -149,6 +153,8 @@ class Outputs:
         print("\n".join(lines), flush=True)
         rest = {self.names.side(end): writer for end, writer in (self.pictures | self.others).items()}
         try:
+            if request.interrupted:
+                raise KeyboardInterrupt
             for path, writer in rest.items():
                 self._attempt(partial(writer, path, request, result, self.force), path)
         except KeyboardInterrupt:
@@ -225,8 +231,8 @@ def _words(error: Exception) -> str:
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Adds the options that say where they go."""
     add = parser.add_argument
-    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM); "
-        "what belongs to it is named after it: NAME.report.json and others")  # fmt: skip
+    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM), "
+        "or a folder; what belongs to it is named after it: NAME.report.json and others")  # fmt: skip
     add("--results", metavar="FOLDER", help="folder of NAME.report.json and all else (default: that of OUTPUT)")
     add("--no-pictures", action="store_true", help="write no pictures")
     add("--force", action="store_true", help="replace files that exist, and remove pictures of the earlier run")

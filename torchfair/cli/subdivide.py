@@ -14,6 +14,7 @@ from .output_checks import make_folders, refuse_taken, refuse_unknown_format
 from .output_names import OutputNames
 from .reading import in_numbers_of, said_of
 from .result_files import save_result
+from .several import add_inputs
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -38,8 +39,9 @@ def add_parser(subparsers: Any) -> None:
         "subdivide", help="refine a mesh", description=_DESCRIPTION, allow_abbrev=False
     )
     add = parser.add_argument
-    add("input", metavar="INPUT", help="mesh file, or a built-in example:NAME")
-    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
+    add_inputs(parser, "mesh file, or a built-in example:NAME")
+    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF, PLY, "
+        "STL, GLB or 3DM), or a folder")  # fmt: skip
     add("--scheme", choices=_SCHEMES, default="hybrid", help="loop for triangles; catmull-clark; hybrid, which is loop "
         "on triangles and catmull-clark on other faces; or midpoint, which moves nothing (default hybrid)")  # fmt: skip
     add("--levels", type=positive_count, default=1, metavar="N", help="how often (default 1)")
