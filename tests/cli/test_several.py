@@ -164,6 +164,32 @@ def test_ctrl_c_ends_the_whole(
     )
 
 
+OUT_OF_RANGE = [
+    *(("fair", option) for option in ("smallest-angle", "corner-angle", "crease-angle")),
+    *(("form", option) for option in ("corner-angle", "least-angle")),
+    *(("mesh", option) for option in ("corner-angle", "crease-angle", "boundary-angle")),
+    *(("symmetric", "smallest-angle"), ("subdivide", "corner-angle"), ("fair", "smallest-area"), ("form", "through")),
+    *(("fair", "planar-reach"), ("symmetric", "saddle-margin"), ("form", "smoothing")),
+]
+
+
+@pytest.mark.parametrize(("command", "option"), OUT_OF_RANGE)
+@pytest.mark.parametrize("number", ["200", "-1", "nan"])
+def test_what_is_out_of_range_is_refused_by_name_once_and_before_anything_is_read(
+    command: str, option: str, number: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if option in ("through", "planar-reach", "saddle-margin") and number != "nan":
+        number = "inf" if option != "planar-reach" else "-2"
+    count = ["--quads", "9"] if command == "mesh" else []
+    words = [f"--{option}={number}"] if option != "through" else ["--through", "0", number, "0"]
+    for inputs in (["missing.obj"], ["missing.obj", "another.obj"]):
+        assert main([command, *inputs, "-o", str(tmp_path / "out"), *count, *words]) == 2
+        line = one_line(capsys)
+        assert f"--{option}" in line
+        assert "missing" not in line
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_every_command_takes_several_inputs() -> None:
     for command in ("measure", "diagnose", "reflect", "fair", "form", "symmetric", "denoise", "mesh", "subdivide"):
         output = [] if command in ("measure", "diagnose", "reflect") else ["-o", "out"]

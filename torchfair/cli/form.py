@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from .arguments import positive_count
+from .arguments import finite, positive_count
 from .chosen_vertices import ChosenVertices
 from .form_inputs import read_form_input
 from .form_mesh import FormOutputs, add_mesh
@@ -70,7 +70,7 @@ class FormCommand(JobCommand):
             "vertices have other numbers then; always done without a mesh to start from")  # fmt: skip
         add("--vertices", type=positive_count, default=1000, metavar="N", help="size of a start made from curves "
             "(default 1000)")  # fmt: skip
-        add("--through", nargs=3, action="append", default=[], type=float, metavar=("X", "Y", "Z"),
+        add("--through", nargs=3, action="append", default=[], type=finite, metavar=("X", "Y", "Z"),
             help="a point to pass through: pulls the nearest inner vertex of the start; repeatable")  # fmt: skip
         add_levels(parser)
         add_mesh(parser)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .._interrupts import deferred_interrupts
+from .._names import FROM_ZERO
 from .exit_codes import IN_WORDS, exit_code
 from .options import SettingOptions
 from .outputs import Outputs, Request, Writer, add_outputs, asked_for
@@ -80,7 +81,7 @@ class JobCommand(ABC):
             allow_abbrev=False,
             fill=self._fill,
         )
-        parser.set_defaults(run=self.run, name=self.name)
+        parser.set_defaults(run=self.run, check=self.check, name=self.name)
 
     def _fill(self, parser: CommandParser) -> None:
         self.add_inputs(parser)
@@ -91,10 +92,12 @@ class JobCommand(ABC):
         """The options that are settings."""
         return SettingOptions(self.settings(), self.job, self.option_names)
 
+    def check(self, arguments: argparse.Namespace) -> None:
+        """Refuses settings that no input can have."""
+        self.options().settings(arguments)
+
     def run(self, arguments: argparse.Namespace) -> int:
         """Checks everything that can be checked first, then solves, then writes; the exit code."""
-        from .._names import FROM_ZERO
-
         settings = self.options().settings(arguments)
         outputs = self.outputs(arguments)
         outputs.prepare()

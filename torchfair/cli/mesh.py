@@ -67,7 +67,7 @@ def add_parser(subparsers: Any) -> None:
         allow_abbrev=False,
         fill=fill,
     )
-    parser.set_defaults(run=run, name=NAME)
+    parser.set_defaults(run=run, check=check, name=NAME)
 
 
 def fill(parser: CommandParser) -> None:
@@ -90,13 +90,18 @@ def options() -> SettingOptions[MeshingSettings]:
     return SettingOptions(MeshingSettings, "mesh", {})
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Checks what can be checked first, then reads, meshes, writes and prints."""
+def check(arguments: argparse.Namespace) -> MeshingSettings:
+    """The settings; refuses what no input can have."""
     if (arguments.quads is None) == (arguments.triangles is None):
         raise CommandError("give one of --quads N and --triangles N")
     if arguments.planar and arguments.triangles:
         raise CommandError("--planar is for --quads: triangles are planar")
-    settings = options().settings(arguments)
+    return options().settings(arguments)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Checks what can be checked first, then reads, meshes, writes and prints."""
+    settings = check(arguments)
     outputs = MeshOutputs(arguments, {"mesh.png": draw_singular, "edges.png": _edges})
     outputs.prepare()
     surface = read_input(arguments.input, arguments)

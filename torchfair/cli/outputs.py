@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..io import PolygonMesh
 
-_NOT_ASKED = ("run", "name", "version", "quiet")
+_NOT_ASKED = ("run", "check", "name", "version", "quiet")
 _BYTES = 200  # of a vertex and its faces as text, about
 _BYTES_OF_OTHERS = 1_000_000  # of a report or a picture
 

@@ -64,6 +64,8 @@ def run_inputs(arguments: argparse.Namespace, teller: Callable[[argparse.Namespa
     requests = _requests(arguments, inputs)
     if len(requests) == 1 and not getattr(arguments, "csv", False):
         return int(requests[0].run(requests[0]))
+    if hasattr(arguments, "check"):
+        arguments.check(arguments)
     told = teller(arguments)
     if told.keeps_json:
         for request in requests:

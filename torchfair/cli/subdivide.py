@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import non_negative, positive_count
+from .arguments import degrees, positive_count
 from .edge_marks import carried, end_of_marks, read_marks
 from .inputs import add_repair, read_input
 from .output_checks import make_folders, refuse_taken, refuse_unknown_format
@@ -47,7 +47,7 @@ def add_parser(subparsers: Any) -> None:
     add("--levels", type=positive_count, default=1, metavar="N", help="how often (default 1)")
     add("--boundary", choices=("curve", "interpolate", "polyline"), default="curve", help="smooth the boundary, pass "
         "through its vertices, or keep its edges straight (default curve)")  # fmt: skip
-    add("--corner-angle", type=non_negative, default=40.0, metavar="DEGREES", help="boundary vertices where it turns "
+    add("--corner-angle", type=degrees, default=40.0, metavar="DEGREES", help="boundary vertices where it turns "
         "by more than this stay (default 40)")  # fmt: skip
     add("--labels", metavar="FILE", help="OBJ or JSON file that marks edges (default: INPUT if it marks any)")
     add("--lines", choices=("auto", "parallel", "along"), default="auto", help="mark parts of marked edges alone "
