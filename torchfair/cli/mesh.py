@@ -34,6 +34,7 @@ _DESCRIPTION = (
     "them and the boundary follows a direction becomes lines of the mesh. The topology is that of the surface, or "
     "nothing is written."
 )
+_SHORTEST = 0.02  # edge of a mesh, in mean edges
 _ROWS = {
     "faces": "faces",
     "quads": "  quads among them",
@@ -45,6 +46,8 @@ _ROWS = {
     "total_absolute_curvature": "C of the surface",
     "variation_over_curvature": "E/C",
     "distance_max": "largest distance from the surface, in mean edges",
+    "shortest_edge": "shortest edge, in mean edges",
+    "smallest_angle_degrees": "smallest angle of a corner, degrees",
     "spacing_shortest": "shortest spacing asked for",
     "spacing_longest": "longest ...",
     "range_share": "share of the surface at the ends of the range",
@@ -102,10 +105,11 @@ def run(arguments: argparse.Namespace) -> int:
     began = time.perf_counter()
     with in_numbers_of(surface):
         made = _made(surface, arguments, settings)
-    missed: list[str] = []
+    not_planar: list[str] = []
     status = None
     if arguments.planar:
-        made, missed, status = made_planar(made, surface)
+        made, not_planar, status = made_planar(made, surface)
+    missed = [*not_planar, *_too_short(made)]
     request = Request(surface, {})
     outputs.write_mesh(request, made)
     notes = [*surface.notes, *made.notes, *request.notes]
@@ -121,6 +125,16 @@ def _made(surface: PolygonMesh, arguments: argparse.Namespace, settings: Meshing
     if arguments.triangles:
         return principal_triangles(surface.vertices, surface.topology, count=arguments.triangles, settings=settings)
     return principal_quads(surface.vertices, surface.topology, count=arguments.quads, settings=settings)
+
+
+def _too_short(made: Made) -> list[str]:
+    """The promise of the shortest edge, where it is not kept."""
+    from ..formfinding import Promise
+
+    remedy = "corners of the boundary or of creases that close stay: ask for more faces, or raise --corner-angle"
+    reached = made.report["shortest_edge"]
+    promise = Promise("shortest edge", _SHORTEST, reached, "at least", "mean edges", remedy=remedy)
+    return [] if promise.holds else [str(promise)]
 
 
 class MeshOutputs(Outputs):

@@ -10,7 +10,8 @@ from torch import Tensor
 from .._graph import edge_numbers
 from ..principal import PrincipalEdges
 from ..topology import Topology
-from .components import Pieces, mesh_to_count, on_surface, read_surface, spacing_of
+from .components import Pieces, on_surface, read_surface, spacing_of
+from .counts import mesh_to_count
 from .curvature_sizes import CurvatureSizes, curvature_sizes
 from .cut_cells import cut_cells
 from .lattice import triangle_lattice
