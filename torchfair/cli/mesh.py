@@ -109,7 +109,7 @@ def run(arguments: argparse.Namespace) -> int:
     status = None
     if arguments.planar:
         made, not_planar, status = made_planar(made, surface)
-    missed = [*not_planar, *_too_short(made)]
+    missed = [*not_planar, *too_short(made)]
     request = Request(surface, {})
     outputs.write_mesh(request, made)
     notes = [*surface.notes, *made.notes, *request.notes]
@@ -127,7 +127,7 @@ def _made(surface: PolygonMesh, arguments: argparse.Namespace, settings: Meshing
     return principal_quads(surface.vertices, surface.topology, count=arguments.quads, settings=settings)
 
 
-def _too_short(made: Made) -> list[str]:
+def too_short(made: Made) -> list[str]:
     """The promise of the shortest edge, where it is not kept."""
     from ..formfinding import Promise
 
