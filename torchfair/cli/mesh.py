@@ -36,6 +36,7 @@ _DESCRIPTION = (
     "them and the boundary follows a direction becomes lines of the mesh. The topology is that of the surface, or "
     "nothing is written."
 )
+_SHORTEST = 0.02  # edge of a mesh, in mean edges
 _ROWS = {
     "faces": "faces",
     "quads": "  quads among them",
@@ -47,6 +48,8 @@ _ROWS = {
     "total_absolute_curvature": "C of the surface",
     "variation_over_curvature": "E/C",
     "distance_max": "largest distance from the surface, in mean edges",
+    "shortest_edge": "shortest edge, in mean edges",
+    "smallest_angle_degrees": "smallest angle of a corner, degrees",
     "spacing_shortest": "shortest spacing asked for",
     "spacing_longest": "longest ...",
     "range_share": "share of the surface at the ends of the range",
@@ -109,11 +112,12 @@ def run(arguments: argparse.Namespace) -> int:
     began = time.perf_counter()
     with in_numbers_of(surface):
         made = _made(surface, arguments, settings)
-    missed: list[str] = []
+    not_planar: list[str] = []
     status, request = None, Request(surface, {})
     with deferred_interrupts() as interrupts:
         if arguments.planar:
-            made, missed, status = made_planar(made, surface, quiet=getattr(arguments, "quiet", False))
+            made, not_planar, status = made_planar(made, surface, quiet=getattr(arguments, "quiet", False))
+        missed = [*not_planar, *too_short(made)]
         report = _report(arguments, made, settings, missed, time.perf_counter() - began) | read_report(surface)
         outputs.save(request, made, lambda: report)
         request.interrupted = interrupts.pending
@@ -129,6 +133,16 @@ def _made(surface: PolygonMesh, arguments: argparse.Namespace, settings: Meshing
     if arguments.triangles:
         return principal_triangles(surface.vertices, surface.topology, count=arguments.triangles, settings=settings)
     return principal_quads(surface.vertices, surface.topology, count=arguments.quads, settings=settings)
+
+
+def too_short(made: Made) -> list[str]:
+    """The promise of the shortest edge, where it is not kept."""
+    from ..formfinding import Promise
+
+    remedy = "corners of the boundary or of creases that close stay: ask for more faces, or raise --corner-angle"
+    reached = made.report["shortest_edge"]
+    promise = Promise("shortest edge", _SHORTEST, reached, "at least", "mean edges", remedy=remedy)
+    return [] if promise.holds else [str(promise)]
 
 
 class MeshOutputs(Outputs):
