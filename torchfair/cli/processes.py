@@ -92,7 +92,7 @@ def run_in_processes(
     threads = max(1, _processors() // jobs)
     ended: dict[int, tuple[Outcome, str]] = {}
     running: dict[int, _Process] = {}
-    begun, told, stopped = 0, 0, False
+    begun, done, told, stopped = 0, 0, 0, False
     with deferred_interrupts() as interrupts, _all_ended(running):
         while told < len(requests):
             try:
@@ -106,7 +106,8 @@ def run_in_processes(
                 for number in [number for number, process in running.items() if not process.runs]:
                     ended[number] = running.pop(number).ended()
                     stopped = stopped or ended[number][0].code == EXIT_INTERRUPTED
-                    _say(len(ended), requests, number, ended[number][0])
+                    done += 1
+                    _say(done, requests, number, ended[number][0])
                 if told not in ended:
                     time.sleep(_WAIT)
             except KeyboardInterrupt:
@@ -137,8 +138,8 @@ def _all_ended(running: dict[int, _Process]) -> Iterator[None]:
 
 
 def _say(count: int, requests: Sequence[Any], number: int, outcome: Outcome) -> None:
-    words = "done" if not outcome.code else outcome.error or f"exit code {outcome.code}"
-    print(f"[{count}/{len(requests)}] {requests[number].input}: {words}", file=sys.stderr, flush=True)
+    name = requests[number].input
+    print(f"[{count}/{len(requests)}] {name}: {outcome.words.removeprefix(f'{name}: ')}", file=sys.stderr, flush=True)
 
 
 def _processors() -> int:
