@@ -19,7 +19,6 @@ from .exit_codes import EXIT_INTERRUPTED
 from .outcomes import Outcome
 
 _WAIT = 0.05  # seconds between looks
-_WORKER = [sys.executable, "-m", "torchfair.cli.worker"]
 
 
 class _Process:
@@ -31,7 +30,7 @@ class _Process:
         request.quiet = True
         # A session of its own: Ctrl-C at the terminal reaches this process alone, which hands it on once.
         self._process = subprocess.Popen(
-            _WORKER,
+            _worker(),
             stdin=subprocess.PIPE,
             stdout=self._out,
             stderr=self._err,
@@ -120,6 +119,12 @@ def run_in_processes(
                     print(f"== {requests[told].input}\n{printed}", end="", flush=True)
                 yield requests[told], outcome, printed
                 told += 1
+
+
+def _worker() -> list[str]:
+    """The program that does a request; it finds modules where this one does, and not in the working folder first."""
+    lines = [f"sys.path[:] = {sys.path!r}", "from torchfair.cli.worker import main", "sys.exit(main())"]
+    return [sys.executable, "-c", "; ".join(["import sys", *lines])]
 
 
 def _printed() -> IO[str]:
