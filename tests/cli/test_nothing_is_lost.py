@@ -18,7 +18,7 @@ from torchfair import MeshFileError
 from torchfair.cli import main
 from torchfair.cli.inputs import read_input
 from torchfair.cli.job_command import JobCommand
-from torchfair.cli.outputs import Request
+from torchfair.cli.request import Request
 from torchfair.formfinding import FairSettings, minimise_normal_variation
 from torchfair.io import load_mesh, save_mesh
 
@@ -126,6 +126,27 @@ def test_a_name_that_is_taken_meanwhile_is_left_alone(
     assert f"{taken}: exists already" in last
     assert f"the mesh is {folder.out / 'roof-3.obj'} instead, its report {folder.out / 'roof-3.report.json'}" in last
     assert load_mesh(folder.out / "roof-3.obj").topology.num_faces == 8
+
+
+def test_a_file_that_another_process_holds_open_stays_and_the_result_is_beside(
+    folder: Folder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On Windows no file takes the name of one that is open."""
+    assert folder.run() == 0
+    before, real = folder.content(), os.replace
+
+    def refuse(source: Path, target: Path) -> None:
+        if target.name == "roof.report.json" and source.suffix == ".tmp" and not held:
+            held.append(source)
+            raise PermissionError(13, "The process cannot access the file")
+        real(source, target)
+
+    held: list[Path] = []
+    assert folder.run("--force", meanwhile=lambda: folder.monkeypatch.setattr(os, "replace", refuse)) == 2
+    after = folder.content()
+    assert {name: after[name] for name in before} == before
+    assert set(after) == ALL | {name.replace("roof", "roof-2") for name in ALL}
+    assert "roof.report.json: cannot be written (The process cannot access the file)" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("full", [("out",), ("out", "working"), ("out", "working", "home")])

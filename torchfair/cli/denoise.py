@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from .inputs import add_repair, read_input
 from .job_command import JobCommand
-from .outputs import Request, Writer
 from .pictures import draw_before_after
+from .request import Request, Writer
 from .several import add_inputs
 
 if TYPE_CHECKING:

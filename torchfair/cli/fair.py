@@ -22,8 +22,8 @@ from .inputs import (
     read_reference,
 )
 from .job_command import JobCommand
-from .outputs import Request, Writer
 from .pictures import draw_before_after
+from .request import Request, Writer
 from .several import add_inputs
 
 if TYPE_CHECKING:

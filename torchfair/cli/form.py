@@ -13,8 +13,8 @@ from .form_inputs import read_form_input
 from .form_mesh import FormOutputs, add_mesh
 from .inputs import add_handles, add_levels, add_repair, read_handles
 from .job_command import JobCommand
-from .outputs import Request, Writer
 from .pictures import draw_edges
+from .request import Request, Writer
 from .several import add_inputs
 
 if TYPE_CHECKING:

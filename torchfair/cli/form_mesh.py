@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from .arguments import positive_count
 from .mesh import draw_singular, table
-from .outputs import Outputs, Request, Writer
+from .outputs import Outputs
+from .request import Request, Writer
 from .result_files import save_result
 
 if TYPE_CHECKING:

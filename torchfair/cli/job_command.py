@@ -12,9 +12,10 @@ from .._interrupts import deferred_interrupts
 from .._names import FROM_ZERO
 from .exit_codes import IN_WORDS, exit_code
 from .options import SettingOptions
-from .outputs import Outputs, Request, Writer, add_outputs, asked_for
+from .outputs import Outputs, add_outputs, asked_for
 from .parser import CommandParser
 from .reading import in_numbers_of, read_report
+from .request import Request, Writer
 from .summary import kept_lines, measures_table, missed_lines, note_lines, work_lines
 
 if TYPE_CHECKING:

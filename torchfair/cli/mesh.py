@@ -16,9 +16,10 @@ from .exit_codes import IN_WORDS, exit_code
 from .inputs import add_repair, read_input
 from .mesh_planar import made_planar
 from .options import SettingOptions
-from .outputs import Outputs, Request, Writer, add_outputs, asked_for
+from .outputs import Outputs, add_outputs, asked_for
 from .parser import CommandParser
 from .reading import in_numbers_of, read_report
+from .request import Request, Writer
 from .several import add_inputs
 from .summary import note_lines
 

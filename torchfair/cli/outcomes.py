@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..errors import TorchfairError
 from .errors import CommandError
-from .exit_codes import EXIT_ERROR, EXIT_INTERRUPTED, EXIT_OK
+from .exit_codes import EXIT_ERROR, EXIT_INTERRUPTED, EXIT_NOT_REACHED, EXIT_OK
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,18 @@ class Outcome:
         """For stderr, one line; empty where there is nothing to say."""
         words = self.error if self.code == EXIT_INTERRUPTED or not self.error else f"error: {self.error}"
         return " ".join(f"{self.name}: {words}".split()) if words else ""
+
+    @property
+    def words(self) -> str:
+        """How it ended, for a list of many."""
+        if self.error:
+            return " ".join(self.error.split())
+        known = {
+            EXIT_OK: "done",
+            EXIT_NOT_REACHED: "something that was asked for was not reached",
+            EXIT_INTERRUPTED: "interrupted",
+        }
+        return known.get(self.code, f"ended with code {self.code}")
 
 
 def outcome_of(run: Callable[[], int], name: str) -> Outcome:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from .elsewhere import places
 from .errors import CommandError
 from .output_checks import make_folders, refuse_report_of_another, refuse_taken, refuse_unknown_format, remove
 from .output_names import FILES, OutputNames, listed, listed_in
+from .request import Report, Request, Writer
 from .result_files import save_result
 
 if TYPE_CHECKING:
@@ -24,41 +24,6 @@ if TYPE_CHECKING:
 _NOT_ASKED = ("run", "check", "name", "version", "quiet")
 _BYTES = 200  # of a vertex and its faces as text, about
 _BYTES_OF_OTHERS = 1_000_000  # of a report or a picture
-
-
-@dataclass
-class Request:
-    """What a job is to do.
-
-    Attributes:
-        mesh: Where it starts.
-        options: Arguments of the function that does it, by name, beside settings and callback.
-        start: Its first arguments; by default vertices and topology of the mesh.
-        notes: What was decided while reading, in words.
-        warnings: What is likely to fail, and what to do instead; said before it is tried.
-        marks: Marked edges (E,) of the mesh, which go with it; None for none.
-        settings: To solve with; by default those that options ask for.
-        report: Entries of the report beside those that all jobs have.
-        missed: What was asked for beside the job and is not there, in words.
-        interrupted: Whether the job was interrupted too late for that to change it, or what comes after it was.
-    """
-
-    mesh: PolygonMesh
-    options: dict[str, Any]
-    start: Sequence[Any] = ()
-    notes: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    settings: Any = None
-    marks: Tensor | None = None
-    report: dict[str, Any] = field(default_factory=dict)
-    missed: list[str] = field(default_factory=list)
-    interrupted: bool = False
-
-
-Writer = Callable[[Path, Any, Any, bool], object]
-"""Writes one file from its path, the request, the result, and whether it may replace a file."""
-Report = Callable[[], Mapping[str, Any]]
-"""Makes the entries of a report."""
 
 
 class Outputs:

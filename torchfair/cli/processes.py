@@ -19,7 +19,6 @@ from .exit_codes import EXIT_INTERRUPTED
 from .outcomes import Outcome
 
 _WAIT = 0.05  # seconds between looks
-_WORKER = [sys.executable, "-m", "torchfair.cli.worker"]
 
 
 class _Process:
@@ -31,7 +30,7 @@ class _Process:
         request.quiet = True
         # A session of its own: Ctrl-C at the terminal reaches this process alone, which hands it on once.
         self._process = subprocess.Popen(
-            _WORKER,
+            _worker(),
             stdin=subprocess.PIPE,
             stdout=self._out,
             stderr=self._err,
@@ -92,7 +91,7 @@ def run_in_processes(
     threads = max(1, _processors() // jobs)
     ended: dict[int, tuple[Outcome, str]] = {}
     running: dict[int, _Process] = {}
-    begun, told, stopped = 0, 0, False
+    begun, done, told, stopped = 0, 0, 0, False
     with deferred_interrupts() as interrupts, _all_ended(running):
         while told < len(requests):
             try:
@@ -106,7 +105,8 @@ def run_in_processes(
                 for number in [number for number, process in running.items() if not process.runs]:
                     ended[number] = running.pop(number).ended()
                     stopped = stopped or ended[number][0].code == EXIT_INTERRUPTED
-                    _say(len(ended), requests, number, ended[number][0])
+                    done += 1
+                    _say(done, requests, number, ended[number][0])
                 if told not in ended:
                     time.sleep(_WAIT)
             except KeyboardInterrupt:
@@ -119,6 +119,12 @@ def run_in_processes(
                     print(f"== {requests[told].input}\n{printed}", end="", flush=True)
                 yield requests[told], outcome, printed
                 told += 1
+
+
+def _worker() -> list[str]:
+    """The program that does a request; it finds modules where this one does, and not in the working folder first."""
+    lines = [f"sys.path[:] = {sys.path!r}", "from torchfair.cli.worker import main", "sys.exit(main())"]
+    return [sys.executable, "-c", "; ".join(["import sys", *lines])]
 
 
 def _printed() -> IO[str]:
@@ -137,8 +143,8 @@ def _all_ended(running: dict[int, _Process]) -> Iterator[None]:
 
 
 def _say(count: int, requests: Sequence[Any], number: int, outcome: Outcome) -> None:
-    words = "done" if not outcome.code else outcome.error or f"exit code {outcome.code}"
-    print(f"[{count}/{len(requests)}] {requests[number].input}: {words}", file=sys.stderr, flush=True)
+    name = requests[number].input
+    print(f"[{count}/{len(requests)}] {name}: {outcome.words.removeprefix(f'{name}: ')}", file=sys.stderr, flush=True)
 
 
 def _processors() -> int:

@@ -16,7 +16,7 @@ from typing import Protocol
 
 from .arguments import positive_count
 from .errors import CommandError
-from .exit_codes import EXIT_ERROR, EXIT_INTERRUPTED, EXIT_NOT_REACHED, EXIT_OK
+from .exit_codes import EXIT_INTERRUPTED, EXIT_NOT_REACHED, EXIT_OK
 from .outcomes import Outcome, outcome_of
 from .output_checks import MESH_FORMATS
 from .output_names import input_stem
@@ -162,14 +162,7 @@ def _listed(name: str, requests: Sequence[argparse.Namespace], outcomes: Sequenc
     if not bad:
         return EXIT_OK
     lines = [f"{name}: {len(requests) - len(bad)} of {len(requests)} done"]
-    lines += [f"  {request.input}: {_words(end).removeprefix(f'{request.input}: ')}" for request, end in bad]
+    lines += [f"  {request.input}: {end.words.removeprefix(f'{request.input}: ')}" for request, end in bad]
     print("\n".join(lines), file=sys.stderr, flush=True)
     interrupted = any(end.code == EXIT_INTERRUPTED for _, end in bad)
     return EXIT_INTERRUPTED if interrupted else EXIT_NOT_REACHED
-
-
-def _words(outcome: Outcome) -> str:
-    if outcome.error:
-        return " ".join(outcome.error.split())
-    known = {EXIT_NOT_REACHED: "something that was asked for was not reached", EXIT_INTERRUPTED: "interrupted"}
-    return known.get(outcome.code, "failed" if outcome.code == EXIT_ERROR else f"ended with code {outcome.code}")

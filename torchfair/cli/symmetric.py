@@ -23,9 +23,10 @@ from .inputs import (
     read_reference,
 )
 from .job_command import JobCommand
-from .outputs import Outputs, Request, Writer
+from .outputs import Outputs
 from .pictures import draw_edges
 from .reading import in_numbers_of
+from .request import Request, Writer
 from .result_files import not_held
 from .several import add_inputs
 from .strips import StripFiles, add_strips

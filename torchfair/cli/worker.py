@@ -1,4 +1,4 @@
-"""``python -m torchfair.cli.worker``: does one request, which it reads from stdin, for a command with many inputs."""
+"""The program that does one request, which it reads from stdin, for a command with many inputs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,3 @@ def main() -> int:
     except KeyboardInterrupt:
         return 130
     return guarded(lambda: int(request.run(request)), request.name)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

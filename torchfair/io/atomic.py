@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import secrets
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import MeshFileError
+from .staged import StagedFile, drop, staged, take_names
 
-_WAITING: ContextVar[list[_Written] | None] = ContextVar("files that wait for each other", default=None)
+_WAITING: ContextVar[list[StagedFile] | None] = ContextVar("files that wait for each other", default=None)
 
 
 def atomic_write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool = False) -> None:
@@ -34,16 +30,11 @@ def atomic_write_bytes(path: str | os.PathLike[str], data: bytes, *, overwrite: 
         MeshFileError: if the folder is missing, the path exists (without ``overwrite``) or is not a regular
             file, or the system refuses.
     """
-    shown = Path(path)
-    with _faults_of(shown):
-        target = Path(os.path.realpath(shown)) if overwrite else shown
-        _check_target(shown, target, overwrite)
-        written = _Written(shown, target, overwrite, _temporary(target, data))
-    waiting = _WAITING.get()
+    file, waiting = staged(Path(path), data, overwrite), _WAITING.get()
     if waiting is not None:
-        waiting.append(written)
+        waiting.append(file)
     else:
-        _take_names([written])
+        take_names([file])
 
 
 @contextmanager
@@ -66,147 +57,13 @@ def written_together() -> Iterator[None]:
     if _WAITING.get() is not None:
         yield
         return
-    written: list[_Written] = []
-    token = _WAITING.set(written)
+    files: list[StagedFile] = []
+    token = _WAITING.set(files)
     try:
         yield
     except BaseException:
-        _drop(file.temporary for file in written)
+        drop(file.temporary for file in files)
         raise
     finally:
         _WAITING.reset(token)
-    _take_names(written)
-
-
-@dataclass(frozen=True)
-class _Written:
-    """A file that is written but for its name.
-
-    Attributes:
-        shown: Its name as it was given.
-        target: The same without links.
-        overwrite: Whether it may replace a file.
-        temporary: Its name until then.
-    """
-
-    shown: Path
-    target: Path
-    overwrite: bool
-    temporary: Path
-
-    def take_name(self) -> None:
-        """Gives it its name."""
-        if not self.overwrite:
-            _claim_name(self.temporary, self.target)
-            return
-        if self.target.exists():
-            shutil.copymode(self.target, self.temporary)
-        os.replace(self.temporary, self.target)
-
-
-def _take_names(files: list[_Written]) -> None:
-    """Gives all files their names; if one cannot have it, all is put back."""
-    before: list[tuple[_Written, Path | None]] = []
-    try:
-        for file in files:
-            with _faults_of(file.shown):
-                old = _second_name(file) if len(files) > 1 else None
-                before.append((file, old))
-                try:
-                    file.take_name()
-                except BaseException:
-                    before.pop()
-                    if old is not None:
-                        old.unlink()
-                    raise
-    except BaseException:
-        for file, old in reversed(before):
-            with contextlib.suppress(OSError):
-                file.target.unlink() if old is None else os.replace(old, file.target)
-        raise
-    finally:
-        _drop([*(file.temporary for file in files), *(old for _, old in before if old is not None)])
-
-
-def _second_name(file: _Written) -> Path | None:
-    """Another name of the file that is to be replaced; None if there is none, or where files have one name only."""
-    if not file.overwrite or not file.target.exists():
-        return None
-    other = _unused(file.target.parent)
-    try:
-        os.link(file.target, other)
-    except OSError:
-        shutil.copy2(file.target, other)
-    return other
-
-
-def _drop(files: Iterator[Path] | list[Path]) -> None:
-    for file in files:
-        with contextlib.suppress(FileNotFoundError):
-            file.unlink()
-
-
-@contextmanager
-def _faults_of(path: Path) -> Iterator[None]:
-    """Errors of the system name the file."""
-    try:
-        yield
-    except FileExistsError:
-        raise _exists(path) from None
-    except OSError as error:
-        raise MeshFileError(path, f"cannot be written ({error.strerror or error})") from None
-    except ValueError as error:  # a NUL character in the path
-        if isinstance(error, MeshFileError):
-            raise
-        raise MeshFileError(path, f"is no usable file name ({error})") from None
-
-
-def _exists(path: Path) -> MeshFileError:
-    return MeshFileError(path, "exists already. Choose another name, or ask for overwriting (overwrite=True, --force)")
-
-
-def _check_target(shown: Path, target: Path, overwrite: bool) -> None:
-    if not target.parent.is_dir():
-        raise MeshFileError(shown, f"the folder {target.parent} does not exist. Create it first")
-    if target.is_dir():
-        raise MeshFileError(shown, "is a folder. Give the name of a file in it")
-    if os.path.lexists(target):
-        if not overwrite:
-            raise _exists(shown)
-        if not target.is_file():
-            raise MeshFileError(shown, "is not a regular file, so it cannot be replaced")
-
-
-def _unused(folder: Path) -> Path:
-    return folder / f".torchfair-{secrets.token_hex(8)}.tmp"
-
-
-def _temporary(target: Path, data: bytes) -> Path:
-    """The bytes in a file beside ``target``."""
-    temporary = _unused(target.parent)
-    try:
-        # os.open rather than tempfile: the file gets the permissions that the user's umask asks for
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-        with os.fdopen(os.open(temporary, flags, 0o666), "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-    except BaseException:
-        _drop([temporary])
-        raise
-    return temporary
-
-
-def _claim_name(temporary: Path, target: Path) -> None:
-    """Gives ``temporary`` the name ``target``; FileExistsError if that name is taken."""
-    try:
-        os.link(temporary, target)
-    except FileExistsError:
-        raise
-    except OSError:  # a file system without hard links: claim the name with an empty file, then replace that
-        os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
-        try:
-            os.replace(temporary, target)
-        except OSError:
-            target.unlink()
-            raise
+    take_names(files)
