@@ -11,16 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 FLOORS = (
     {"errors", "_interrupts", "_loading", "_precision", "_shown", "_solver_names", "_tables", "_threads"},
-    {
-        "_names",
-        "_numbers",
-        "_ranges",
-        "_tracing",
-        "cameras",
-        "linear",
-        "progress",
-        "rasterisation",
-    },
+    {"_names", "_numbers", "_ranges", "_tracing", "cameras", "linear", "progress", "rasterisation"},
     {"_half_edges", "settings"},
     {"_connectivity", "projection"},
     {"topology"},

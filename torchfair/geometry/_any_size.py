@@ -34,6 +34,6 @@ def of_any_size(power: int) -> Callable[[Quantity[Arguments]], Quantity[Argument
                 value = value * factor
             return value
 
-        return in_single_at_least(scaled)  # type: ignore[return-value]  # names of its arguments are kept
+        return in_single_at_least(scaled)
 
     return decorated

@@ -115,8 +115,8 @@ class ReflectionLoss(MeshModule):
     def _render_reference(self) -> None:
         if self.setup.reference is not None and self.reference_images is None and self.reference_area is not None:
             images, _, coverage = self.setup.reference_pictures
-            like = self.reference_area
-            self.reference_images, self.reference_coverage = images.to(like), coverage.to(like)
+            place = {"dtype": self.reference_area.dtype, "device": self.reference_area.device}
+            self.reference_images, self.reference_coverage = images.to(**place), coverage.to(**place)
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
         """Loss (*batch,) of ``vertices`` (*batch, V, 3)."""
