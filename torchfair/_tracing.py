@@ -14,7 +14,7 @@ def is_recorded() -> bool:
     """
     return (
         torch.compiler.is_compiling()
-        or torch.jit.is_tracing()  # type: ignore[no-untyped-call]
+        or torch._C._get_tracing_state() is not None
         or torch._C._len_torch_dispatch_stack() > 0
     )
 
@@ -32,7 +32,7 @@ def refuse_recording(what: str) -> None:
     """
     if torch.compiler.is_compiling() and not torch.compiler.is_exporting():
         return
-    if torch.compiler.is_exporting() or torch.jit.is_tracing() or _proxies_are_made():  # type: ignore[no-untyped-call]
+    if torch.compiler.is_exporting() or torch._C._get_tracing_state() is not None or _proxies_are_made():
         raise TorchfairError(
             f"{what} cannot be recorded (export, make_fx, jit.trace, torch.func.linearize): which face is seen where "
             "depends on the vertices. Call it in eager mode, leave it out of what is exported, and use torch.func.jvp "

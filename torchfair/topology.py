@@ -166,7 +166,7 @@ class Topology:
 
     @cached_table
     def fingerprint(self) -> str:
-        """A checksum of faces and number of vertices: equal for equal meshes, with corners and faces in equal order."""
+        """Checksum of the faces and of V, equal where faces and corners are equal in equal order."""
         digest = hashlib.sha256(str(self.num_vertices).encode())
         for tensor in (self.corners, self.face_offsets):
             digest.update(tensor.cpu().numpy().tobytes())

@@ -85,7 +85,7 @@ class MeshModule(nn.Module, metaclass=_MadeForTraining):
         return self
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__(state)
+        super().__setstate__(state)  # type: ignore[no-untyped-call]
         self._set_topology(self.topology)  # pickles leave its tables out
 
     @property

@@ -34,6 +34,7 @@ def of_any_size(power: int) -> Callable[[Quantity[Arguments]], Quantity[Argument
                 value = value * factor
             return value
 
-        return in_single_at_least(scaled)
+        quantity: Quantity[Arguments] = in_single_at_least(scaled)  # type: ignore[arg-type]  # arguments by name, too
+        return quantity
 
     return decorated

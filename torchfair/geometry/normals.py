@@ -32,8 +32,8 @@ def face_normals(vertices: Tensor, topology: Topology) -> Tensor:
         topology: connectivity; any polygons, mixed.
 
     Returns:
-        (*batch, F, 3), length 1 or (degenerate faces) 0. Squared areas must be within the range of the
-        dtype: edges between 1e-9 and 1e9 in float32.
+        (*batch, F, 3), length 1 or (degenerate faces) 0, for meshes of any size. Beside parts 1e9 times as large, in
+        float32, small faces pass for degenerate.
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).

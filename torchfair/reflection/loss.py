@@ -108,15 +108,15 @@ class ReflectionLoss(MeshModule):
 
     @property
     def belongs_to_mesh(self) -> bool:
-        """Always: the reference is that of one mesh."""
+        """True, since the reference is that of one mesh."""
         return True
 
     @torch.inference_mode(False)
     def _render_reference(self) -> None:
         if self.setup.reference is not None and self.reference_images is None and self.reference_area is not None:
             images, _, coverage = self.setup.reference_pictures
-            place = {"dtype": self.reference_area.dtype, "device": self.reference_area.device}
-            self.reference_images, self.reference_coverage = images.to(**place), coverage.to(**place)
+            like = self.reference_area
+            self.reference_images, self.reference_coverage = images.to(like), coverage.to(like)
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
         """Loss (*batch,) of ``vertices`` (*batch, V, 3)."""
