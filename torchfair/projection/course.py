@@ -103,7 +103,7 @@ class Course:
         if not outcome.accepted and settings.takes_every_step:
             return replace(self, iteration=iteration, last=outcome, status=Status.DIVERGED)
         if not outcome.accepted:
-            damping = outcome.damping.rejected()
+            damping = outcome.damping.rejected(outcome.gain)
             suspected = damping.exhausted or (outcome.short and not self.doubted)
             return Course(
                 self.standing,

@@ -141,6 +141,7 @@ class Trials:
         that they do not stop all others.
         """
         structure, system, promised = self._problem.structure, self._proposal.system, self._promised
+        whole = change
         every = range(len(self.merits))
         if len(seen) < len(every):
             trial = self._evaluate(change, seen)
@@ -151,17 +152,33 @@ class Trials:
             trial = self._evaluate(change)
             merits = trial.merits.tolist()
             if all(map(math.isfinite, merits)):
-                return _Tried(trial, change, every, merits, promised)
+                tried = _Tried(trial, change, every, merits, promised)
+                return tried if any(fall > 0.0 for fall in promised) else self._shorter(whole) or tried
             change = torch.where(structure.unknowns_of_infinite_elements(trial), 0.5 * change, change)
             promised = system.predicted_fall(change).tolist()
         lost = [not math.isfinite(merit) for merit in merits]
         if all(lost):
-            return None
+            return self._shorter(whole)
         # Those that are nowhere finite stay where they are; they must not stop the other members.
         stay = torch.tensor(lost, device=change.device)
         change = torch.where(self._problem.layout.member_spread(stay), 0.0, change)
         trial, promised = self._evaluate(change), system.predicted_fall(change).tolist()
         return _Tried(trial, change, every, trial.merits.tolist(), promised)
+
+    def _shorter(self, change: Tensor) -> _Tried | None:
+        """What a step leads to that is shortened as a whole until all members are finite; None if none is.
+
+        Where elements are of very different sizes, a step in which some parts are held back is not downhill any more.
+        Shortened evenly it always is, and that costs no solve.
+        """
+        for _ in range(_HALVINGS):
+            change = 0.5 * change
+            trial = self._evaluate(change)
+            merits = trial.merits.tolist()
+            if all(map(math.isfinite, merits)):
+                promised = self._proposal.system.predicted_fall(change).tolist()
+                return _Tried(trial, change, range(len(merits)), merits, promised)
+        return None
 
     def _admits(self, trial: State) -> bool:
         return self._guard is None or self._guard(self._state.evaluation.state, trial)
