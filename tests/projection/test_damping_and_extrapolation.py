@@ -57,6 +57,7 @@ def test_damping_rises_by_what_a_step_overshot() -> None:
     assert damping.rejected(-400.0).value == pytest.approx(4.0)
     assert damping.rejected(-400.0).growth == damping.rejected().growth == 4.0
     assert damping.rejected(-1e30).value == pytest.approx(1e3)
+    assert damping.shortened(2).value == pytest.approx(1.6)
     for gain in (0.0, -1.0, -9.0, -math.inf, math.nan):
         assert damping.rejected(gain).value == pytest.approx(0.2)
     assert Damping(0.1, growth=1024.0).rejected(-400.0).value == pytest.approx(102.4)

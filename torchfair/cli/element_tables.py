@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .errors import CommandError
+
 if TYPE_CHECKING:
     from torch import Tensor
 
@@ -33,6 +35,13 @@ def tables_of(arguments: argparse.Namespace) -> dict[Path, Callable[[Tensor, Top
     """Texts of the tables that are asked for, by their paths."""
     asked = ((arguments.panels, panel_table), (arguments.edges, edge_table))
     return {Path(file): text for file, text in asked if file is not None}
+
+
+def refuse_one_table(arguments: argparse.Namespace) -> None:
+    """Refuses one file for the tables of several inputs."""
+    for option in ("panels", "edges"):
+        if getattr(arguments, option, None) is not None:
+            raise CommandError(f"--{option} names one file: give one input, or leave it out for several")
 
 
 def table_writers(arguments: argparse.Namespace) -> dict[Path, Callable[[Path, Any, Any, bool], object]]:

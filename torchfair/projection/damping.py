@@ -27,6 +27,10 @@ class Damping:
         """After an accepted step whose actual over predicted decrease is ``gain``."""
         return Damping(max(self.value * max(_FASTEST_FALL, 1.0 - (2.0 * min(gain, 1.0) - 1.0) ** 3), SMALLEST))
 
+    def shortened(self, halvings: int) -> Damping:
+        """After an accepted step that had to be halved so often: what keeps the next one as short, about."""
+        return Damping(self.value * 4.0**halvings)
+
     def rejected(self, gain: float = 0.0) -> Damping:
         """After a rejected step of that ``gain``, or a singular system.
 

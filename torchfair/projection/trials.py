@@ -39,6 +39,7 @@ class Trials:
             minus infinity while there is none.
         merits: Its merit.
         taken: Whether there is any.
+        halvings: How often it had to be halved as a whole.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class Trials:
         self.merits = [course.merit for course in state.courses]
         self.gains = [-math.inf for _ in state.courses]
         self.taken = [False for _ in state.courses]
+        self.halvings = [0 for _ in state.courses]
 
     def offer(self, change: Tensor, to: Sequence[bool] | None = None, *, again: bool = False) -> Evaluation | None:
         """Tries a step (N,); members for which it is the best so far take it.
@@ -107,6 +109,7 @@ class Trials:
         """The members that take what was tried, and their places in it."""
         for number, row in zip(takes, rows, strict=True):
             self.merits[number], self.taken[number] = tried.merits[row], True
+            self.halvings[number] = tried.halvings
         if len(takes) == len(self.merits):
             self._best, self._change = tried.trial, tried.change
         elif takes:
@@ -171,13 +174,13 @@ class Trials:
         Where elements are of very different sizes, a step in which some parts are held back is not downhill any more.
         Shortened evenly it always is, and that costs no solve.
         """
-        for _ in range(_HALVINGS):
+        for number in range(1, _HALVINGS + 1):
             change = 0.5 * change
             trial = self._evaluate(change)
             merits = trial.merits.tolist()
             if all(map(math.isfinite, merits)):
                 promised = self._proposal.system.predicted_fall(change).tolist()
-                return _Tried(trial, change, range(len(merits)), merits, promised)
+                return _Tried(trial, change, range(len(merits)), merits, promised, number)
         return None
 
     def _admits(self, trial: State) -> bool:
@@ -192,10 +195,11 @@ class Trials:
 
 
 class _Tried(NamedTuple):
-    """A state tried, the step to it, and of members: numbers in the state, merits there, and falls promised to all."""
+    """A state tried, the step to it, numbers, merits and promised falls of members, and halvings of the whole step."""
 
     trial: Evaluation
     change: Tensor
     seen: Sequence[int]
     merits: list[float]
     promised: list[float]
+    halvings: int = 0
