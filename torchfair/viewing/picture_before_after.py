@@ -36,7 +36,7 @@ def picture_before_after(
 ) -> tuple[int, int]:
     """Writes a PNG with the mesh before (left) and after (right): flat shaded above, mirroring stripes below.
 
-    Of larger meshes a third row shows what surrounds the edge that had the largest l |a| before, in both.
+    Of larger meshes a third row shows what surrounds the edge that had the largest ``l |a|`` before, in both.
 
     All four views share one camera, and both reflections the same striped surroundings: a smooth surface shows
     smooth stripes. The captions give E (normal variation) and E' (angle variation).

@@ -43,7 +43,7 @@ def picture_edges(
 
     Camera and colour scale are common to all; the scale ends at the largest value, or at the 98 % quantile where
     the largest is more than 1.5 times that (the colour bar then ends in an arrow). Boundary edges are thin and grey.
-    Of meshes with very different mean edges, values are divided by the square of these: l |a| of the same surface is
+    Of meshes with very different mean edges, values are divided by the square of these: ``l |a|`` of one surface is
     four times as large on edges twice as long.
 
     Args:
