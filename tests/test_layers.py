@@ -21,6 +21,7 @@ FLOORS = (
     {"fields", "principal", "reflection", "self_intersections", "stars"},
     {"constraints", "measuring", "meshing", "viewing"},
     {"formfinding"},
+    {"design"},
     {"cli"},
 )
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}

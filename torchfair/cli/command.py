@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from ..errors import TorchfairError
-from . import denoise, diagnose, fair, form, measure, mesh, reflect, subdivide, symmetric
+from . import denoise, design, diagnose, fair, form, measure, mesh, reflect, subdivide, symmetric
 from .errors import CommandError
 from .exit_codes import EXIT_BROKEN_PIPE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_OK, IN_WORDS
 from .parser import CommandParser
 
 _JOBS = (fair.COMMAND, form.COMMAND, symmetric.COMMAND, denoise.COMMAND)
-_COMMANDS = (measure, diagnose, reflect, *_JOBS, mesh, subdivide)
+_COMMANDS = (measure, diagnose, reflect, *_JOBS, mesh, subdivide, design)
 _DESCRIPTION = "Visual smoothness of polyhedral surfaces: measure it, improve it."
 
 

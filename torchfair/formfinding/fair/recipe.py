@@ -109,9 +109,9 @@ class FairRecipe(Recipe[FairSettings]):
         settings = replace(self.settings.projection, least_extrapolation=math.inf, least_uncorrected_gain=0.0)
         return self.problem.stage(state, 1.0, 1.0, settings)
 
-    def state(self) -> State:
-        """The start, with auxiliary variables that fit it."""
-        return self.problem.blocks(self.start)
+    def blocks(self, vertices: Tensor) -> State:
+        """With auxiliary variables that fit."""
+        return self.problem.blocks(vertices)
 
     def placed(self, state: State) -> Tensor:
         """Gliding vertices are put on their curves."""
