@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 NAME = "torchfair design"
 _DESCRIPTION = (
     "Opens a page in the browser in which a mesh follows the mouse: handles are pulled, vertices fixed, weights "
-    "turned, and facets are shown as mirrors. Files are those of the folder in which the command is started. The page is "
-    "reached from this machine alone, with the token in its address; from elsewhere through ssh -L."
+    "turned, and facets are shown as mirrors. Files are those of the folder in which the command is started. The page "
+    "is reached from this machine alone, with the token in its address; from elsewhere through ssh -L."
 )
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _MEBIBYTE = 1 << 20

@@ -12,6 +12,7 @@ from ..errors import TorchfairError
 
 if TYPE_CHECKING:
     from .engine.requests import Open
+    from .hub import MakeEngine
     from .server import DesignServer, ServerSettings
 
 T = TypeVar("T")
@@ -43,6 +44,7 @@ class BackgroundServer:
     Args:
         settings: How it is reached.
         opening: What is opened first.
+        make_engine: By default a child process.
 
     Example::
 
@@ -50,11 +52,14 @@ class BackgroundServer:
             print(server.url)
     """
 
-    def __init__(self, settings: ServerSettings, opening: Open | None = None) -> None:
+    def __init__(
+        self, settings: ServerSettings, opening: Open | None = None, make_engine: MakeEngine | None = None
+    ) -> None:
         require_websockets()
+        from .engine.process import EngineProcess
         from .server import DesignServer
 
-        self.server = DesignServer(settings, opening)
+        self.server = DesignServer(settings, opening, make_engine or EngineProcess)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True, name="torchfair-design")
         self._thread.start()

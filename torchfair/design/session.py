@@ -16,11 +16,11 @@ from .events import heard
 from .folder import Folder
 from .history import History
 from .inquiries import INQUIRIES
+from .limits import MOST_UPLOAD
 from .states import ALLOWED, DesignState
 from .telling import error_message, handles_message
 
 _PATIENCE = 2.0  # seconds after which a drag is let go whose window has gone
-_MOST_UPLOAD = 128 << 20
 _FIRST = ("settings", "topology")
 _HANDLERS = {**EDITS, **INQUIRIES}
 
@@ -42,7 +42,7 @@ class DesignSession:
         effects += session.window_opened(1)
     """
 
-    def __init__(self, folder: Folder, clock: Callable[[], float], upload_bytes: int = _MOST_UPLOAD) -> None:
+    def __init__(self, folder: Folder, clock: Callable[[], float], upload_bytes: int = MOST_UPLOAD) -> None:
         self._core = Core(folder, clock, upload_bytes)
 
     @property

@@ -4,18 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
 from ...errors import TorchfairError
-from ...formfinding import Progress, Session
+from ...formfinding import Session
 from ...topology import Topology
 from ..document import Document, Floats, Place
 from .measures import Deviation
 from .recipes import AnyRecipe, put, same_job, session_of, topology_of
 from .sliders import weight_range
+
+
+_CALM = 0.03
+"""Mean edges: after a step that moves no vertex farther than this, the mesh waits for the next move of the mouse."""
+
+
+class Stepped(NamedTuple):
+    """What a live step did.
+
+    Attributes:
+        moved: Whether the mesh has moved.
+        goes_on: Whether there is a reason for another one.
+    """
+
+    moved: bool
+    goes_on: bool
 
 
 class Follower:
@@ -89,14 +105,20 @@ class Follower:
             self.session.move(places)
         self.document = replace(document, vertices=self.document.vertices)
 
-    def step(self) -> Progress:
-        """One live step."""
+    def step(self) -> Stepped:
+        """One live step.
+
+        Steps could go on lowering the merit for long after handles have been reached; :meth:`settle` does that at once.
+        """
         self.is_at_rest = False
-        progress = self.session.step()
-        self._moved |= progress.accepted
+        before, progress = self.session.vertices, self.session.step()
         handles = len(self.document.handles)
         self.status = progress.reason or f"follows {handles} handle{'s' * (handles != 1)}"
-        return progress
+        if not progress.accepted:
+            return Stepped(False, False)
+        self._moved = True
+        way = float(torch.linalg.vector_norm(self.session.vertices - before, dim=1).max())
+        return Stepped(True, way > _CALM * self.session.recipe.unit.length)
 
     def settle(self, *, whole: bool, stop: Callable[[], bool], watch: Callable[[Tensor], None]) -> bool:
         """To rest, or the whole job; whether it was stopped."""

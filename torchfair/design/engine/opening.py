@@ -14,10 +14,10 @@ from ...errors import MeshError, TorchfairError
 from ...io import PolygonMesh, edge_labels_path, load_edge_labels, load_mesh
 from ...shapes import EXAMPLES, SURFACES, builtin_mesh
 from ..document import Document
+from ..limits import MOST_VERTICES
 from ..questions import REPAIRS, answers
 from ..session_file import SUFFIX, read_session
 from .recipes import faces_of
-from .remaking import MOST_VERTICES
 from .requests import Asked, Event, Made, Open
 
 

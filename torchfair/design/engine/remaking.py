@@ -13,9 +13,8 @@ from ...errors import MeshError
 from ...meshing import principal_quads, principal_triangles
 from ...principal import PrincipalEdges, misalignment_of
 from ..document import Document
+from ..limits import MOST_VERTICES
 from .recipes import faces_of, principal_of, session_of, topology_of
-
-MOST_VERTICES = 200_000
 
 
 def remade(document: Document, how: str, options: Mapping[str, Any]) -> tuple[Document, list[str]]:

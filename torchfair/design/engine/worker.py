@@ -49,7 +49,15 @@ class Worker:
         """Until the other end of the pipe is gone. Nothing is computed while nothing has to be done."""
         self._say(r.Started(0))
         while True:
-            self.do(self._inbox.next())
+            self.do(self.next())
+
+    def waits(self) -> bool:
+        """Whether there is something to do."""
+        return self._inbox.has_more()
+
+    def next(self) -> r.Request:
+        """The next thing to do, waited for without end."""
+        return self._inbox.next()
 
     def do(self, request: r.Request) -> None:
         """One request; what goes wrong is said."""
@@ -106,12 +114,11 @@ class Worker:
             if self._inbox.paused:
                 self._inbox.wait()
                 continue
-            progress = follower.step()
-            if progress.accepted:
+            stepped = follower.step()
+            if stepped.moved:
                 self._show(drag.serial, DRAGGING, drag.count)
-                self._measure(drag.serial)
-            elif not self._inbox.has_more():
-                self._measure(drag.serial)
+            self._measure(drag.serial, now=not stepped.goes_on)
+            if not stepped.goes_on and not self._inbox.has_more():
                 return
 
     def _settle(self, serial: int, *, whole: bool) -> None:
@@ -120,7 +127,8 @@ class Worker:
         def watch(vertices: Tensor) -> None:
             if self._clock() - self._framed >= _BETWEEN_FRAMES:
                 self._show_vertices(vertices, serial, 0, 0)
-                self._measure_vertices(vertices, serial)
+                if self._clock() - self._measured >= _BETWEEN_NUMBERS:
+                    self._measure_vertices(vertices, serial)
 
         def stop() -> bool:
             return self._inbox.is_stopped(serial)
@@ -160,13 +168,11 @@ class Worker:
         self._framed = self._clock()
         self._say(r.Shown(serial, follower.number, places, origin, edges, scale, flags, count))
 
-    def _measure(self, serial: int, *, rest: bool = False) -> None:
-        if rest or self._clock() - self._measured >= _BETWEEN_NUMBERS:
+    def _measure(self, serial: int, *, rest: bool = False, now: bool = False) -> None:
+        if rest or now or self._clock() - self._measured >= _BETWEEN_NUMBERS:
             self._measure_vertices(self._following().vertices, serial, rest=rest)
 
     def _measure_vertices(self, vertices: Tensor, serial: int, *, rest: bool = False) -> None:
-        if not rest and self._clock() - self._measured < _BETWEEN_NUMBERS:
-            return
         follower = self._following()
         topology, document = follower.topology, follower.document
         numbers = live_numbers(vertices, topology, document.handles, self._worst)

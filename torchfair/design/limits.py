@@ -1,0 +1,6 @@
+"""How large things may be."""
+
+MOST_VERTICES = 200_000
+"""Of a mesh that is designed with."""
+MOST_UPLOAD = 128 << 20
+"""Bytes of a file that is dropped."""
