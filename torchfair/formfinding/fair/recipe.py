@@ -94,6 +94,10 @@ class FairRecipe(Recipe[FairSettings]):
         """Where a handle leaves the reference surface, that is given up."""
         self.problem.reconsider()
 
+    def put_at(self, state: State) -> None:
+        """Vertices beyond the distance limit may not go farther away than they are."""
+        self.problem.near.lift(self.placed(state))
+
     def snapshot(self) -> Callable[[], None]:
         """Puts back whether the reference surface is given up."""
         return self.problem.snapshot()

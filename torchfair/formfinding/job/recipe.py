@@ -154,6 +154,9 @@ class Recipe(ABC, Generic[S]):
     def reconsider(self) -> None:
         """Called after handles or held vertices have changed, for decisions that depend on them."""
 
+    def put_at(self, state: State) -> None:
+        """Called once a mesh was put elsewhere, for bounds that it does not keep there: it may come back to them."""
+
     def check_pulls(self, vertices: Tensor, targets: Tensor) -> None:
         """Refuses handles (n,) with targets (n, 3), in the unit of the input, that cannot be reached."""
 

@@ -150,6 +150,7 @@ class Session(Generic[R]):
         self.state = self.recipe.state_at(vertices.to("cpu", torch.float64))
         self.recipe.forget()
         self.recipe.reconsider()
+        self.recipe.put_at(self.state)
         self._following, self._moved = None, True
 
     def weigh(self, **weights: float) -> None:
