@@ -68,6 +68,8 @@ def test_what_is_opened_is_told_and_nothing_has_moved(bench: Bench, tube: Path) 
     assert frame.topology == message["topology"]
     assert last(bench, "numbers")["E"] == pytest.approx(float(normal_variation(mesh.vertices, mesh.topology)))
     assert last(bench, "numbers")["deviation"] == pytest.approx(0.0, abs=1e-12)
+    start = arrays["start"].reshape(-1, 3) + np.array(message["origin"])
+    assert np.allclose(start, mesh.vertices.numpy(), atol=1e-6)
     assert not bench.worker.waits()
 
 

@@ -123,4 +123,4 @@ class Document:
         if (self.principal is None) != (other.principal is None) or not self.faces.same(other.faces):
             return False
         same = self.principal is None or np.array_equal(self.principal, other.principal)  # type: ignore[arg-type]
-        return same and np.array_equal(self.origin, other.origin)
+        return same and np.array_equal(self.start, other.start)

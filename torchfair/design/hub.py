@@ -165,15 +165,18 @@ class Hub:
 
     async def _make_file(self, effect: Store | Deliver) -> None:
         """Makes a file, and writes it or sends it."""
+        done = None if effect.id is None else json.dumps({"type": "done", "id": effect.id})
         try:
             if isinstance(effect, Deliver):
                 answer: str | bytes = await asyncio.to_thread(download_message, effect)
             else:
                 answer = json.dumps(await asyncio.to_thread(store, effect))
         except (TorchfairError, OSError, ValueError) as error:
-            answer = json.dumps(error_message(str(error), "save", effect.id))
+            answer, done = json.dumps(error_message(str(error), "save", effect.id)), None
         if effect.window is not None:
             self._put(effect.window, answer)
+            if done is not None:
+                self._put(effect.window, done)
 
     def _start_engine(self, effect: StartEngine) -> None:
         """Another engine; whatever the last one still says is not heard."""

@@ -11,7 +11,7 @@ from .core import Core
 from .edits import Handler
 from .effects import Autosave, Deliver, Effect, Store, Tell
 from .engine import requests as r
-from .formats import FORMATS, SESSION
+from .formats import FORMATS, SESSION, examples
 from .questions import REPAIRS
 from .session_file import session_bytes
 from .states import DesignState
@@ -41,7 +41,12 @@ class Saving:
 
 
 def _list(core: Core, window: int, command: Command) -> list[Effect]:
-    message = {"type": "files", "id": command.id, "folder": core.folder.path.name, "files": core.folder.listing()}
+    message = {
+        "type": "files",
+        "folder": core.folder.path.name,
+        "files": core.folder.listing(),
+        "examples": examples(),
+    }
     return [Tell(message, window), *core.done(window, command)]
 
 
@@ -124,8 +129,8 @@ def _save_session(core: Core, saving: Saving, window: int, id: int | None) -> li
 
 def _command_line(core: Core, window: int, command: Command) -> list[Effect]:
     text, exact, sentence = command_line(core.now)
-    message = {"type": "command_line", "id": command.id, "text": text, "exact": exact, "sentence": sentence}
-    return [Tell(message, window)]
+    message = {"type": "command_line", "text": text, "exact": exact, "sentence": sentence}
+    return [Tell(message, window), *core.done(window, command)]
 
 
 def _base(name: str) -> str:

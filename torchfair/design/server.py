@@ -15,14 +15,13 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from ..shapes import EXAMPLES, SURFACES
 from .access import LOOPBACK, Access, new_token
 from .autosave import Keeper
 from .commands import MOST_JSON, PROTOCOL, CommandRefused, read_command
 from .engine.process import EngineProcess
 from .engine.requests import Open
 from .folder import OPENS, Folder
-from .formats import formats_message
+from .formats import examples, formats_message
 from .hub import Hub, MakeEngine, Window
 from .limits import MOST_UPLOAD, MOST_VERTICES
 from .session import DesignSession
@@ -196,13 +195,12 @@ class DesignServer:
     def _welcome(self) -> dict[str, Any]:
         from .. import __version__
 
-        examples = [{"name": f"example:{name}", "words": name.replace("_", " ")} for name in [*EXAMPLES, *SURFACES]]
         return {
             "type": "welcome",
             "protocol": PROTOCOL,
             "version": __version__,
             "folder": self._folder.path.name,
-            "examples": examples,
+            "examples": examples(),
             "open": list(OPENS),
             "save": formats_message(),
             "limits": {"upload_bytes": self._settings.upload_bytes, "vertices": MOST_VERTICES},

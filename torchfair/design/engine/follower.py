@@ -17,7 +17,6 @@ from .measures import Deviation
 from .recipes import AnyRecipe, put, same_job, session_of, topology_of
 from .sliders import weight_range
 
-
 _CALM = 0.03
 """Mean edges: after a step that moves no vertex farther than this, the mesh waits for the next move of the mouse."""
 

@@ -51,6 +51,7 @@ def topology_message(document: Document, topology: Topology, number: int) -> byt
         "edge_faces": _edge_faces(topology),
         "labels": _labels(document, start, topology),
         "boundary": topology.is_boundary_vertex.numpy().astype(np.uint8),
+        "start": (document.start - document.origin).astype(np.float32),
     }
     if document.names is not None:
         arrays["vertex_names"] = document.names.astype(np.int32)
