@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -50,3 +54,9 @@ def random_rotation(seed: int = 0) -> Tensor:
     """A proper rotation matrix."""
     matrix = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     return torch.from_numpy(matrix * np.sign(np.linalg.det(matrix)))
+
+
+def report_in(folder: Path) -> dict[str, Any]:
+    """The report of the one output whose report is in a folder."""
+    (path,) = folder.glob("*.report.json")
+    return dict(json.loads(path.read_text()))

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 FLOORS = (
-    {"errors", "_interrupts", "_shown", "_threads"},
+    {"errors", "_interrupts", "_shown", "_solver_names", "_threads"},
     {"_names", "_numbers", "_ranges", "cameras", "linear", "progress", "rasterisation"},
     {"_half_edges", "settings"},
     {"_connectivity", "projection"},

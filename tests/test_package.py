@@ -1,10 +1,14 @@
-"""Importing torchfair costs little more than importing torch."""
+"""Importing torchfair costs nothing, and its parts little more than importing torch; all names are there even so."""
 
 from __future__ import annotations
 
+import ast
 import json
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
 
 import torchfair
 
@@ -21,10 +25,59 @@ def modules_after(statement: str) -> set[str]:
     return set(json.loads(output.stdout))
 
 
+PARTS = sorted(path.stem for path in Path(torchfair.__file__).parent.glob("[a-z]*") if path.suffix in ("", ".py"))
+
+
 def test_heavy_libraries_are_imported_only_where_used() -> None:
-    brought_along = modules_after("import torchfair") - modules_after("import torch, numpy")
+    brought_along = modules_after("import torchfair; torchfair.load_mesh") - modules_after("import torch, numpy")
     assert "torchfair.topology" in brought_along  # or nothing was measured
     assert sorted(HEAVY & brought_along) == []
+
+
+def test_neither_torch_nor_numpy_is_imported_before_there_is_work() -> None:
+    """Help, version and typing errors; settings are told without the jobs that they are for."""
+    words = (
+        [["--help"], ["--version"], ["sing"], ["measure", "--loud"], ["measure", "--help"], ["fair", "roof.obj"]]
+        + [[job, "--help"] for job in ("fair", "form", "symmetric", "denoise", "mesh", "subdivide", "reflect")]
+        + [["fair", "roof.obj", "-o", "x.obj", "--smoothing", "soft"]]
+    )
+    lines = "; ".join(f"main({line})" for line in words)
+    code = (
+        "import contextlib, io, sys\n"
+        "with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:\n"
+        f"    from torchfair.cli import main; {lines}\n"
+        "assert out.getvalue().count('usage: ') == 9, out.getvalue()\n"
+        "assert err.getvalue().count('error: ') == 4, err.getvalue()"
+    )
+    modules = modules_after(code)
+    assert "torchfair.settings.fair_settings" in modules  # or no options were made
+    assert sorted({"torch", "numpy", "scipy"} & modules) == []
+
+
+def test_all_names_are_there_for_people_and_type_checkers() -> None:
+    tree = ast.parse(Path(torchfair.__file__).read_text(encoding="utf-8"))
+    told = {
+        alias.asname
+        for block in tree.body
+        if isinstance(block, ast.If)
+        for statement in block.body
+        if isinstance(statement, ast.ImportFrom)
+        for alias in statement.names
+    }
+    lazy = set(torchfair._HOME) | set(torchfair._PARTS)
+    assert told == lazy
+    assert lazy <= set(dir(torchfair))
+    assert {name for name in PARTS if name != "cli"} == set(torchfair._PARTS)
+    for name in torchfair._HOME:
+        assert getattr(torchfair, name).__name__ == name
+        assert getattr(torchfair, name) is torchfair.__dict__[name]  # looked for once
+    with pytest.raises(AttributeError, match="'torchfair' has no attribute 'Topologie'"):
+        _ = torchfair.Topologie
+
+
+def test_star_and_parts_need_no_import_of_their_own() -> None:
+    assert "torchfair.meshing" in modules_after("import torchfair; torchfair.meshing.principal_quads")
+    assert "torch" in modules_after("from torchfair import *; Topology, load_mesh, NormalVariation")
 
 
 def test_reading_and_writing_own_formats_does_not_import_trimesh() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from ._half_edges import HalfEdges as HalfEdges
 from ._half_edges import Ints as Ints
 from ._half_edges import build_half_edges as build_half_edges
+from ._half_edges import edge_keys, groups_of
 from ._half_edges import first_few as first_few
 from ._half_edges import pack_faces as pack_faces
 from ._names import Part, PlacedError, few, few_groups
@@ -34,11 +35,7 @@ def pair_half_edges(half: HalfEdges) -> tuple[Ints, Ints, Ints]:
     ``first`` and ``second`` are the two half-edges of the interior edges, ``single`` those of boundary edges.
     Orientation is not looked at; edges with more than two faces are refused.
     """
-    tails, heads = half.corners, half.heads
-    keys = np.minimum(tails, heads) * max(half.num_vertices, 1) + np.maximum(tails, heads)
-    order = np.argsort(keys, kind="stable")
-    starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
-    counts = np.diff(np.r_[starts, keys.size])
+    order, starts, counts = groups_of(edge_keys(half.corners, half.heads, half.num_vertices))
     _check_manifold_edges(half, order, starts, counts)
     interior = starts[counts == 2]
     return order[interior], order[interior + 1], order[starts[counts == 1]]

@@ -36,6 +36,19 @@ class HalfEdges:
         return self.corners[self.next]
 
 
+def edge_keys(tails: Ints, heads: Ints, count: int) -> Ints:
+    """One number for each edge among ``count`` vertices, whichever way it is traversed."""
+    keys: Ints = np.minimum(tails, heads) * np.int64(max(count, 1)) + np.maximum(tails, heads)
+    return keys
+
+
+def groups_of(keys: Ints) -> tuple[Ints, Ints, Ints]:
+    """Equal keys as ``(order, starts, counts)``: group i is ``order[starts[i] : starts[i] + counts[i]]``."""
+    order = np.argsort(keys, kind="stable")
+    starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    return order, starts, np.diff(np.append(starts, keys.size))
+
+
 def pack_faces(faces: object) -> tuple[Ints, Ints]:
     """Faces in any accepted form as ``(corners, offsets)``.
 

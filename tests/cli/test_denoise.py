@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 import torch
+from helpers import report_in
 
 from torchfair.cli import main
 from torchfair.formfinding import denoise
@@ -29,7 +29,7 @@ def scan(tmp_path: Path) -> Path:
 def test_a_scan_is_cleaned_and_reported(scan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "clean.obj"
     assert main(["denoise", str(scan), "-o", str(output), "--no-pictures"]) == 0
-    report = json.loads((tmp_path / "report.json").read_text())
+    report = report_in(tmp_path)
     noisy, clean = load_mesh(scan), load_mesh(output)
     assert torch.equal(clean.vertices, denoise(noisy.vertices, noisy.topology).vertices)
     radii = [(mesh.vertices.norm(dim=1) - 10.0).abs().mean() for mesh in (noisy, clean)]

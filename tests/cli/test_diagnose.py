@@ -59,9 +59,11 @@ def test_pictures_and_report_are_written_once(
     stars_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "out"
-    command = ["diagnose", stars_file, "-o", str(folder), "--vertex", "0", "--vertex", "7"]
+    command = ["diagnose", stars_file, "-o", str(folder), "--vertex", "1", "--vertex", "8"]
     assert main(command) == 0
-    names = {"diagnosis.json", "classes.png", "pyramids.png", "gauss_image.png", "classes.ply"}
+    names = {
+        f"stars.{end}" for end in ("diagnosis.json", "classes.png", "pyramids.png", "gauss_image.png", "classes.ply")
+    }
     assert {path.name for path in folder.iterdir()} == names
     capsys.readouterr()
     assert main(command) == 2
@@ -69,21 +71,21 @@ def test_pictures_and_report_are_written_once(
     assert line.count("\n") == 1
     assert "--force" in line
     assert main([*command, "--force"]) == 0
-    report = read_json((folder / "diagnosis.json").read_text())
+    report = read_json((folder / "stars.diagnosis.json").read_text())
     assert set(KEYS) <= set(report)
     plain = tmp_path / "plain"
     assert main(["diagnose", stars_file, "-o", str(plain), "--no-pictures", "--per-vertex"]) == 0
-    assert [path.name for path in plain.iterdir()] == ["diagnosis.json"]
-    assert "per_vertex" in read_json((plain / "diagnosis.json").read_text())
+    assert [path.name for path in plain.iterdir()] == ["stars.diagnosis.json"]
+    assert "per_vertex" in read_json((plain / "stars.diagnosis.json").read_text())
 
 
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        (["--vertex", "0"], "--output"),
-        (["--vertex", "1", "-o", "out"], "not inside"),
-        (["--vertex", "1000", "-o", "out"], "0 to 139"),
-        (["--vertex", "-1", "-o", "out"], "'-1'"),
+        (["--vertex", "1"], "--output"),
+        (["--vertex", "2", "-o", "out"], "--vertex 2: it is not inside"),
+        (["--vertex", "1000", "-o", "out"], "1 to 140"),
+        (["--vertex", "-1", "-o", "out"], "got -1"),
     ],
 )
 def test_wrong_vertices_are_refused(
@@ -124,8 +126,8 @@ def test_worst_vertices_are_explained(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def test_the_coloured_mesh_is_the_mesh(stars_file: str, tmp_path: Path) -> None:
     assert main(["diagnose", stars_file, "-o", str(tmp_path / "out")]) == 0
-    given, made = load_mesh(stars_file), load_mesh(tmp_path / "out" / "classes.ply")
+    given, made = load_mesh(stars_file), load_mesh(tmp_path / "out" / "stars.classes.ply")
     assert torch.equal(given.vertices, made.vertices)
     assert given.topology.face_lists() == made.topology.face_lists()
-    head = (tmp_path / "out" / "classes.ply").read_bytes().split(b"end_header")[0]
+    head = (tmp_path / "out" / "stars.classes.ply").read_bytes().split(b"end_header")[0]
     assert all(f"property uchar {name}".encode() in head for name in ("red", "green", "blue"))

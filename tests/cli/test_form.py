@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import pytest
-from helpers import wavy_grid
+from helpers import report_in, wavy_grid
 
 from torchfair.cli import main
 from torchfair.io import load_mesh, save_mesh
@@ -58,7 +57,7 @@ def test_mesh_report_and_pictures_are_written(tmp_path: Path, capsys: pytest.Cap
     words = [str(tmp_path / "start.obj"), "-o", str(output), "--levels", "1", "--iterations", "4"]
     assert main(["form", *words]) == 0
     out, err = capsys.readouterr()
-    report = json.loads((output.parent / "report.json").read_text())
+    report = report_in(output.parent)
     after = load_mesh(output)
     assert after.topology.num_faces == 4 * topology.num_faces
     energies = report["energies"]
@@ -68,7 +67,7 @@ def test_mesh_report_and_pictures_are_written(tmp_path: Path, capsys: pytest.Cap
     assert report["levels"][0]["runs"][0]["history"][0]["total_absolute_curvature"] > 0
     assert report["steps"] == sum(run["steps"] for level in report["levels"] for run in level["runs"])
     assert report["settings"]["boundary"] == "fixed"
-    for name in ("curvature.png", "edges.png"):
+    for name in (f"{output.stem}.curvature.png", f"{output.stem}.edges.png"):
         assert (output.parent / name).read_bytes().startswith(b"\x89PNG")
         assert name in out
     assert "C " in err
@@ -80,7 +79,7 @@ def test_normals_in_a_curve_file_prescribe_tangent_planes(tmp_path: Path) -> Non
         (tmp_path / f"{name}.xyz").write_text(circle_rows(height, normals=True))
         words += ["--curve", str(tmp_path / f"{name}.xyz")]
     assert main(["form", *words, "-o", str(tmp_path / "x.obj"), "--vertices", "200", "--no-pictures"]) == 0
-    report = json.loads((tmp_path / "report.json").read_text())
+    report = report_in(tmp_path)
     assert 0 < report["energies"]["after"]["largest_tilt_degrees"] < 0.5
 
 
@@ -133,7 +132,7 @@ def test_existing_files_are_kept(circle: str, tmp_path: Path, capsys: pytest.Cap
 
 
 def notes_of(folder: Path) -> list[str]:
-    return list(json.loads((folder / "report.json").read_text())["notes"])
+    return list(report_in(folder)["notes"])
 
 
 def test_curves_alone_are_tried_from_several_starts(circle: str, tmp_path: Path) -> None:
@@ -172,7 +171,7 @@ def test_a_rim_that_is_not_convex_stays_flat(tmp_path: Path) -> None:
     (tmp_path / "ell.xyz").write_text("0 0 0\n8 0 0\n8 3 0\n3 3 0\n3 8 0\n0 8 0\n")
     words = ["form", "--curve", str(tmp_path / "ell.xyz"), "-o", str(tmp_path / "x.obj"), "--no-pictures"]
     assert main([*words, "--vertices", "100", "--starts", "2"]) == 0
-    after = json.loads((tmp_path / "report.json").read_text())["energies"]["after"]
+    after = report_in(tmp_path)["energies"]["after"]
     assert after["area"] == pytest.approx(39.0, rel=1e-9)
     assert after["normal_variation"] < 1e-6
     assert after["smallest_angle_degrees"] > 15.0

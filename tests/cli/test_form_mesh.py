@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import pytest
 import torch
+from helpers import report_in
 
 from torchfair.cli import main
 from torchfair.io import load_mesh
@@ -46,12 +46,12 @@ def test_quads_are_those_of_the_surface_that_is_written(
     torch.testing.assert_close(quads.vertices, expected.vertices, rtol=0, atol=1e-9)
     assert quads.topology.face_lists() == expected.topology.face_lists()
     assert len(quads.topology.boundary_loops()) == 2
-    report = json.loads((out / "report.json").read_text())
+    report = report_in(out)
     assert report["principal_quads"]["measures"]["faces"] == quads.topology.num_faces
     assert report["energies"]["after"]["total_absolute_curvature"] == pytest.approx(
         report["principal_quads"]["measures"]["total_absolute_curvature"]
     )
-    assert {path.name for path in out.iterdir()} == {"tube.obj", "tube-quads.obj", "report.json"}
+    assert {path.name for path in out.iterdir()} == {"tube.obj", "tube-quads.obj", "tube.report.json"}
     said = capsys.readouterr().out
     assert "angle to principal directions" in said
     assert f"wrote {out / 'tube-quads.obj'}" in said
@@ -77,8 +77,8 @@ def test_the_surface_is_there_if_there_are_no_quads(
     assert said[-1] == f"principal quads (--mesh 80): NOT REACHED; {reason}"
     assert not any("tube-quads" in line for line in said)
     assert load_mesh(out / "tube.obj").topology.num_faces > 80
-    assert {path.name for path in out.iterdir()} == {"tube.obj", "report.json"}
-    report = json.loads((out / "report.json").read_text())
+    assert {path.name for path in out.iterdir()} == {"tube.obj", "tube.report.json"}
+    report = report_in(out)
     assert report["principal_quads"] == {"not_reached": reason}
 
 
@@ -99,12 +99,16 @@ def test_quads_have_a_picture_if_they_are_there(
     words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([*words, "--mesh", "80"]) == 0
-    assert (tmp_path / "out" / "mesh.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "out" / "tube.mesh.png").read_bytes().startswith(b"\x89PNG")
     assert "mesh.png" in capsys.readouterr().out
     monkeypatch.setattr("torchfair.meshing.principal_quads", failing)
     assert main([*words, "--mesh", "80", "--results", str(tmp_path / "other"), "--force"]) == 1
     assert "mesh.png" not in capsys.readouterr().out
-    assert {path.name for path in (tmp_path / "other").iterdir()} == {"report.json", "curvature.png", "edges.png"}
+    assert {path.name for path in (tmp_path / "other").iterdir()} == {
+        "tube.report.json",
+        "tube.curvature.png",
+        "tube.edges.png",
+    }
 
 
 def test_quads_of_an_earlier_run_are_kept_and_named(
@@ -130,8 +134,8 @@ def test_a_wrong_count_is_one_line(words: list[str], tmp_path: Path, capsys: pyt
 
 def test_without_the_option_nothing_is_said_of_quads(words: list[str], tmp_path: Path) -> None:
     assert main([*words, "--no-pictures"]) == 0
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"tube.obj", "report.json"}
-    assert "principal_quads" not in json.loads((tmp_path / "out" / "report.json").read_text())
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"tube.obj", "tube.report.json"}
+    assert "principal_quads" not in report_in(tmp_path / "out")
 
 
 def test_quads_are_cut_where_a_format_has_none(
@@ -141,4 +145,4 @@ def test_quads_are_cut_where_a_format_has_none(
     assert main([*words, "--mesh", "40", "--no-pictures"]) in (0, 1)
     assert "tube-quads.stl holds its polygons cut into triangles" in capsys.readouterr().out
     assert load_mesh(tmp_path / "out" / "tube-quads.stl").topology.is_triangular
-    assert "principal_quads" in json.loads((tmp_path / "out" / "report.json").read_text())
+    assert "principal_quads" in report_in(tmp_path / "out")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-from helpers import wavy_grid
+from helpers import report_in, wavy_grid
 
 from torchfair.cli import main
 from torchfair.cli.inputs import read_input
@@ -27,10 +27,6 @@ def roof(tmp_path: Path) -> Path:
     return tmp_path / "roof.obj"
 
 
-def report_of(folder: Path) -> dict[str, Any]:
-    return json.loads((folder / "report.json").read_text())
-
-
 def test_what_was_not_reached_is_the_last_line_and_exit_code_1(
     roof: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -40,12 +36,12 @@ def test_what_was_not_reached_is_the_last_line_and_exit_code_1(
     assert main(["fair", str(roof), "-o", str(output), *words]) == 1
     out = capsys.readouterr().out
     lines = out.splitlines()
-    assert lines[-2] == f"wrote {output.parent / 'report.json'}"
+    assert lines[-2] == f"wrote {output.parent / 'roof.report.json'}"
     assert lines[-1].startswith("distance of a handle from its target")
     assert "NOT REACHED; faces would become too small" in lines[-1]
     assert out.count("NOT REACHED") == 1  # not once more among the notes
     assert load_mesh(output).topology.num_faces == load_mesh(roof).topology.num_faces
-    report = report_of(output.parent)
+    report = report_in(output.parent)
     assert report["holds"] is False
     missed = [promise for promise in report["promises"] if not promise["holds"]]
     assert [promise["name"] for promise in missed] == ["distance of a handle from its target"]
@@ -68,15 +64,15 @@ def test_a_report_given_back_as_settings_finds_the_same_mesh_to_the_last_bit(roo
     options = ["--fairness", "0.7", "--smallest-angle", "12.3", "--distance", "none", "--iterations", "5"]
     first, second, third = (tmp_path / name / "out.obj" for name in ("first", "second", "third"))
     assert main(["fair", str(roof), "-o", str(first), *options, "--no-pictures"]) == 0
-    given = ["--settings", str(first.parent / "report.json"), "--no-pictures"]
+    given = ["--settings", str(first.parent / "out.report.json"), "--no-pictures"]
     assert main(["fair", str(roof), "-o", str(second), *given]) == 0
     assert second.read_bytes() == first.read_bytes()
-    reports = [report_of(path.parent) for path in (first, second)]
+    reports = [report_in(path.parent) for path in (first, second)]
     assert reports[0]["settings"] == reports[1]["settings"]
     assert reports[0]["energies"] == reports[1]["energies"]
     assert main(["fair", str(roof), "-o", str(third), *given, "--fairness", "0.1"]) == 0
     assert third.read_bytes() != first.read_bytes()
-    assert report_of(third.parent)["settings"]["fairness_weight"] == 0.1
+    assert report_in(third.parent)["settings"]["fairness_weight"] == 0.1
 
 
 def test_reports_of_another_job_and_bad_settings_files_are_refused_before_any_work(
@@ -139,13 +135,13 @@ def test_a_new_job_is_settings_inputs_a_function_and_pictures(
     assert arguments.run(arguments) == 0
     out = capsys.readouterr().out
     assert "note: read" in out
-    report = report_of(output.parent)
+    report = report_in(output.parent)
     assert (report["job"], report["own"]) == ("toy", 1)
     assert report["request"]["input"] == str(roof)
     assert report["settings"]["boundary"] == "fixed"
-    assert (output.parent / "picture.txt").read_text() == str(report["steps"])
+    assert (output.parent / "out.picture.txt").read_text() == str(report["steps"])
     written = [line.removeprefix("wrote ") for line in out.splitlines() if line.startswith("wrote ")]
-    assert [Path(line).name for line in written] == ["out.off", "report.json", "picture.txt"]
+    assert [Path(line).name for line in written] == ["out.off", "out.report.json", "out.picture.txt"]
 
 
 def test_the_mesh_is_there_when_what_follows_fails(roof: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,4 +152,4 @@ def test_the_mesh_is_there_when_what_follows_fails(roof: Path, tmp_path: Path, m
     monkeypatch.setattr("torchfair.cli.command._COMMANDS", (Toy(),))
     output = tmp_path / "new" / "out.obj"
     assert main(["toy", str(roof), "-o", str(output), "--iterations", "1"]) == 2
-    assert {path.name for path in output.parent.iterdir()} == {"out.obj", "report.json"}
+    assert {path.name for path in output.parent.iterdir()} == {"out.obj", "out.report.json"}

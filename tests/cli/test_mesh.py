@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import pytest
 import torch
 from creased_shapes import folded_sheet
+from helpers import report_in
 from PIL import Image
 
 from torchfair.cli import main
@@ -39,14 +39,14 @@ def test_quads_are_those_of_the_library(surface: Path, tmp_path: Path, capsys: p
     expected = principal_quads(source.vertices, source.topology, count=150)
     assert torch.equal(made.vertices, expected.vertices)
     assert made.topology.face_lists() == expected.topology.face_lists()
-    report = json.loads((output.parent / "report.json").read_text())
+    report = report_in(output.parent)
     assert report["measures"]["faces"] == expected.report["faces"]
     assert report["measures"]["angle_mean_degrees"] == expected.report["angle_mean_degrees"]
     assert report["request"]["quads"] == 150
     out = capsys.readouterr().out
     assert "angle to principal directions" in out
     assert "singular points" in out
-    for name in ("mesh.png", "edges.png"):
+    for name in (f"{output.stem}.mesh.png", f"{output.stem}.edges.png"):
         with Image.open(output.parent / name) as picture:
             assert len(picture.convert("RGB").getcolors(1 << 24)) > 20
     assert main(["mesh", str(surface), "-o", str(output), "--quads", "150"]) == 2
@@ -57,9 +57,12 @@ def test_a_report_gives_the_same_mesh_again(surface: Path, tmp_path: Path) -> No
     first, second = tmp_path / "a" / "x.obj", tmp_path / "b" / "x.obj"
     words = ["--quads", "100", "--no-pictures"]
     assert main(["mesh", str(surface), "-o", str(first), *words, "--corner-angle", "60", "--no-align-boundary"]) == 0
-    assert main(["mesh", str(surface), "-o", str(second), *words, "--settings", str(tmp_path / "a/report.json")]) == 0
+    assert (
+        main(["mesh", str(surface), "-o", str(second), *words, "--settings", str(first.with_suffix(".report.json"))])
+        == 0
+    )
     assert first.read_text() == second.read_text()
-    reports = [json.loads((path.parent / "report.json").read_text())["settings"] for path in (first, second)]
+    reports = [report_in(path.parent)["settings"] for path in (first, second)]
     assert reports[0] == reports[1]
     assert reports[0]["align_boundary"] is False
 
@@ -73,7 +76,7 @@ def test_triangles_come_with_their_principal_edges(surface: Path, tmp_path: Path
     labels = output if suffix == ".obj" else output.with_suffix(".edges.json")
     mask = load_edge_labels(labels, made.topology)
     assert 0.2 < float(mask.double().mean()) < 0.4
-    assert (output.parent / "mesh.png").exists()
+    assert (output.with_suffix(".mesh.png")).exists()
 
 
 def test_planar_quads(tmp_path: Path) -> None:
@@ -81,7 +84,7 @@ def test_planar_quads(tmp_path: Path) -> None:
     path, output = tmp_path / "tube.obj", tmp_path / "planar.obj"
     save_mesh(path, mesh.vertices, mesh.topology)
     assert main(["mesh", str(path), "-o", str(output), "--quads", "80", "--planar", "--no-pictures"]) == 0
-    report = json.loads((tmp_path / "report.json").read_text())
+    report = report_in(tmp_path)
     assert report["measures"]["planarity_max"] < 1e-4
     assert report["measures"]["distance_max"] < 0.2
     assert report["measures"]["before_planar"]["faces"] == report["measures"]["faces"]
@@ -101,7 +104,7 @@ def test_ctrl_c_keeps_the_best_mesh(
     path, output = tmp_path / "saddle.obj", tmp_path / "planar.obj"
     save_mesh(path, mesh.vertices, mesh.topology)
     assert main(["mesh", str(path), "-o", str(output), "--quads", "60", "--planar", "--no-pictures"]) == 130
-    report = json.loads((tmp_path / "report.json").read_text())
+    report = report_in(tmp_path)
     assert load_mesh(output).topology.num_faces == report["measures"]["faces"]
     assert len(report["not_reached"]) == 1
     out = capsys.readouterr().out
@@ -114,10 +117,10 @@ def test_creases_are_kept_and_reported(tmp_path: Path, capsys: pytest.CaptureFix
     path, output = tmp_path / "sheet.obj", tmp_path / "out" / "quads.obj"
     save_mesh(path, *folded_sheet())
     assert main(["mesh", str(path), "-o", str(output), "--quads", "60"]) == 0
-    report = json.loads((output.parent / "report.json").read_text())
+    report = report_in(output.parent)
     assert report["measures"]["crease_edges"] > 3
     assert "edges along creases" in capsys.readouterr().out
-    with Image.open(output.parent / "mesh.png") as picture:
+    with Image.open(output.with_suffix(".mesh.png")) as picture:
         assert len(picture.convert("RGB").getcolors(1 << 24)) > 20
 
 

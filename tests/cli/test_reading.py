@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from helpers import wavy_grid
+from helpers import report_in, wavy_grid
 
 from torchfair.cli.command import build_parser, main
 from torchfair.cli.reading import with_default_tolerance
@@ -58,7 +58,7 @@ def test_the_map_of_vertices_is_written(seam: str, tmp_path: Path, capsys: pytes
     output = tmp_path / "new" / "roof.obj"
     assert main(["fair", seam, "--weld", "-o", str(output), "--no-pictures"]) == 0
     assert "repaired: welded 2 vertex(es)" in capsys.readouterr().out
-    assert json.loads((output.parent / "report.json").read_text())["vertex_map"] == [0, 1, 2, 0, 2, 3]
+    assert report_in(output.parent)["vertex_map"] == [0, 1, 2, 0, 2, 3]
     assert load_mesh(output).topology.face_lists() == [[0, 1, 2], [0, 2, 3]]
 
 
@@ -93,12 +93,12 @@ def test_handles_and_marks_keep_the_numbers_of_the_file(tmp_path: Path) -> None:
         "--repair",
         "--weld",
     ]
-    assert main([*words, "--handle", "17", *map(str, place), "--iterations", "3"]) in (0, 1)
+    assert main([*words, "--handle", "18", *map(str, place), "--iterations", "3"]) in (0, 1)
     made = load_mesh(tmp_path / "out" / "o.obj")
     assert made.topology.num_vertices == 16
     assert torch.allclose(made.vertices[9], torch.tensor(place, dtype=torch.float64), atol=2e-3)
     assert (tmp_path / "out" / "o.obj").read_text().count("l 6 7") == 1
-    assert main([*words, "--force", "--handle", "18", "0", "0", "0"]) == 2  # the unused one
+    assert main([*words, "--force", "--handle", "19", "0", "0", "0"]) == 2  # the unused one
 
 
 def test_what_a_job_refuses_is_named_as_the_file_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -170,11 +170,11 @@ def test_symmetric_takes_marks_and_numbers_of_the_file_after_repair(tmp_path: Pa
     lines = [f"l {' '.join(str(7 * i + j + 2) for j in range(7))}" for i in range(7)]
     path.write_text("\n".join([*saddle_lines(), *lines]) + "\n")
     words = ["symmetric", str(path), "-o", str(tmp_path / "out.obj"), "--repair", "--no-pictures", "--steps", "1"]
-    assert main([*words, "--fix", "1"]) in (0, 1)  # the first vertex of a face
+    assert main([*words, "--fix", "2"]) in (0, 1)  # the first vertex of a face
     corner = load_mesh(tmp_path / "out.obj").vertices[0]
     assert corner.tolist() == [-1.0, -1.0, 0.0]
-    assert main([*words, "--force", "--fix", "0"]) == 2  # was dropped
-    assert main([*words, "--force", "--seed", "1", "50"]) == 2
+    assert main([*words, "--force", "--fix", "1"]) == 2  # was dropped
+    assert main([*words, "--force", "--seed", "2", "51"]) == 2
 
 
 def test_numbers_beyond_the_file_are_refused_though_repair_adds_vertices(
@@ -183,8 +183,8 @@ def test_numbers_beyond_the_file_are_refused_though_repair_adds_vertices(
     path = tmp_path / "bow.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv -1 0 0\nv -1 -1 0\nf 1 2 3\nf 1 4 5\n")
     words = ["fair", str(path), "-o", str(tmp_path / "o.obj"), "--repair", "--no-pictures"]
-    assert main([*words, "--fix", "5"]) == 2
-    assert "vertices of the file are numbered 0 to 4, got 5" in capsys.readouterr().err
+    assert main([*words, "--fix", "6"]) == 2
+    assert "vertices are numbered 1 to 5 in the file, got 6" in capsys.readouterr().err
 
 
 def test_what_meshing_has_read_is_in_its_report(tmp_path: Path) -> None:
@@ -192,6 +192,6 @@ def test_what_meshing_has_read_is_in_its_report(tmp_path: Path) -> None:
     path.write_text("\n".join(saddle_lines()) + "\n")
     words = ["mesh", str(path), "-o", str(tmp_path / "o.obj"), "--quads", "30", "--repair", "--no-pictures"]
     assert main(words) in (0, 1)
-    report = json.loads((tmp_path / "report.json").read_text())
+    report = report_in(tmp_path)
     assert report["repairs"]
     assert report["vertex_map"][:3] == [-1, 0, 1]

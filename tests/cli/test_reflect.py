@@ -65,14 +65,14 @@ def test_files_are_written_once(mesh_file: str, tmp_path: Path, capsys: pytest.C
     folder = tmp_path / "out"
     command = ["reflect", mesh_file, "-o", str(folder), *FEW_PIXELS]
     assert main(command) == 0
-    names = {"reflection.json", "views.png", "differences.png", "turntable.gif"}
+    names = {"mesh.reflection.json", "mesh.views.png", "mesh.differences.png", "mesh.turntable.gif"}
     assert {path.name for path in folder.iterdir()} == names
-    with Image.open(folder / "turntable.gif") as film:
+    with Image.open(folder / "mesh.turntable.gif") as film:
         assert film.n_frames == 3
         first = film.convert("L").tobytes()
         film.seek(2)
         assert film.convert("L").tobytes() != first
-    with Image.open(folder / "views.png") as sheet:
+    with Image.open(folder / "mesh.views.png") as sheet:
         assert sheet.width > 6 * 64
         assert len(sheet.convert("RGB").getcolors(1 << 24)) > 50
     capsys.readouterr()
@@ -81,10 +81,10 @@ def test_files_are_written_once(mesh_file: str, tmp_path: Path, capsys: pytest.C
     assert line.count("\n") == 1
     assert "--force" in line
     assert main([*command, "--force", "--frames", "0"]) == 0
-    assert set(KEYS) <= set(read_json((folder / "reflection.json").read_text()))
+    assert set(KEYS) <= set(read_json((folder / "mesh.reflection.json").read_text()))
     plain = tmp_path / "plain"
     assert main(["reflect", mesh_file, "-o", str(plain), "--no-pictures", "--size", "64"]) == 0
-    assert [path.name for path in plain.iterdir()] == ["reflection.json"]
+    assert [path.name for path in plain.iterdir()] == ["mesh.reflection.json"]
 
 
 def test_a_mesh_that_is_not_where_its_reference_is_has_nothing_to_compare(
@@ -99,7 +99,7 @@ def test_a_mesh_that_is_not_where_its_reference_is_has_nothing_to_compare(
     assert "nothing to compare" in said.out
     assert said.err.count("\n") == 1
     assert "no score" in said.err
-    report = read_json((folder / "reflection.json").read_text())
+    report = read_json((folder / "mesh.reflection.json").read_text())
     assert [report[key] for key in KEYS] == [None] * 4
     assert report["compared_of_mesh"] == 0
     assert len(list(folder.iterdir())) == 4
@@ -154,4 +154,8 @@ def test_interruption_leaves_whole_files_only(
     folder = tmp_path / "out"
     assert main(["reflect", mesh_file, "-o", str(folder), *FEW_PIXELS]) == 130
     assert "interrupted" in capsys.readouterr().err
-    assert {path.name for path in folder.iterdir()} == {"reflection.json", "views.png", "differences.png"}
+    assert {path.name for path in folder.iterdir()} == {
+        "mesh.reflection.json",
+        "mesh.views.png",
+        "mesh.differences.png",
+    }

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import pytest
 import torch
 from geometry_meshes import mixed_grid
+from helpers import report_in
 
 from torchfair import Topology
 from torchfair.cli import main
@@ -41,7 +41,7 @@ def error_line(capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_everything_is_written_and_holds(torus: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = torus.parent / "design" / "fine.obj"
-    words = [str(torus), "-o", str(output), "--handle", "3", "2.9", "2.1", "0.2", "--levels", "1", "--strips", "0.1"]
+    words = [str(torus), "-o", str(output), "--handle", "4", "2.9", "2.1", "0.2", "--levels", "1", "--strips", "0.1"]
     assert main(["symmetric", *words]) == 0
     out, err = capsys.readouterr()
     assert "level 1: 320 vertices" in out
@@ -50,14 +50,14 @@ def test_everything_is_written_and_holds(torus: Path, capsys: pytest.CaptureFixt
     edges = PrincipalEdges(fine.topology, load_edge_labels(output, fine.topology)).check()
     for values in condition_residuals(fine.vertices, edges, edges.stars()).values():
         assert float(values.max()) < 1e-8
-    report = json.loads((output.parent / "report.json").read_text())
+    report = report_in(output.parent)
     assert [level["vertices"] for level in report["levels"]] == [80, 320]
     assert report["levels"][1]["after"]["crossing_pyramids_negative"] == 0
     assert report["strips"]["largest_isometry_error"] < 1e-6
     assert report["energies"]["after"]["largest_cospherical"] < 1e-8
-    assert load_mesh(output.parent / "strips.obj").topology.num_faces == report["strips"]["quads"]
-    assert (output.parent / "strips.svg").read_text().startswith("<svg")
-    for name in ("principal.png", "edges.png"):
+    assert load_mesh(output.with_suffix(".strips.obj")).topology.num_faces == report["strips"]["quads"]
+    assert (output.with_suffix(".strips.svg")).read_text().startswith("<svg")
+    for name in (f"{output.stem}.principal.png", f"{output.stem}.edges.png"):
         assert (output.parent / name).read_bytes().startswith(b"\x89PNG")
 
 
@@ -72,7 +72,12 @@ def test_labels_come_from_the_input_from_a_file_from_a_seed_or_from_directions(
     save_edge_labels(side, mesh.topology, edges.mask)
     v, w = mesh.topology.edges[edges.mask][0].tolist()
     for number, words in enumerate(
-        ([str(plain), "--seed", str(v), str(w)], [str(plain), "--labels", str(side)], [str(marked)], [str(plain)])
+        (
+            [str(plain), "--seed", str(v + 1), str(w + 1)],
+            [str(plain), "--labels", str(side)],
+            [str(marked)],
+            [str(plain)],
+        )
     ):
         output = tmp_path / f"{number}.ply"
         folder = ["--results", str(tmp_path / str(number)), "--no-pictures"]
@@ -80,26 +85,26 @@ def test_labels_come_from_the_input_from_a_file_from_a_seed_or_from_directions(
         labels = load_edge_labels(output.with_suffix(".edges.json"), mesh.topology)
         assert torch.equal(labels, edges.mask), words
     out, _ = capsys.readouterr()
-    assert "the family that follows principal directions best, 0.00 radians off" in out
-    assert f"parallel to ({v}, {w}), 0.00 radians off" in out
+    assert "the family that follows principal directions best, 0 degrees off" in out
+    assert f"parallel to the edge {v + 1} - {w + 1}, 0 degrees off" in out
     assert "WARNING" not in out
     assert f"those of {marked}" in out
 
 
 def test_conditions_on_one_polyline(torus: Path) -> None:
     output = torus.parent / "one.obj"
-    words = [str(torus), "-o", str(output), "--on", "12", "--energy", "0.1", "--no-pictures", "--steps", "40"]
+    words = [str(torus), "-o", str(output), "--on", "13", "--energy", "0.1", "--no-pictures", "--steps", "40"]
     assert main(["symmetric", *words]) == 0
-    report = json.loads((torus.parent / "report.json").read_text())
+    report = report_in(torus.parent)
     assert report["levels"][0]["after"]["stars"] == 10
 
 
 def test_refusals(torus: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = ["-o", str(torus.parent / "x.obj")]
     for words, said in (
-        ([str(torus), *output, "--seed", "0", "77"], "not joined"),
-        ([str(torus), *output, "--fix", "800"], "numbered 0 to 79"),
-        ([str(torus), *output, "--on", "800"], "numbered 0 to 79"),
+        ([str(torus), *output, "--seed", "1", "78"], "not joined"),
+        ([str(torus), *output, "--fix", "800"], "numbered 1 to 80"),
+        ([str(torus), *output, "--on", "0"], "numbered 1 to 80 in the file, got 0"),
         ([str(torus), *output, "--handle", "3", "a", "b", "c"], "--handle"),
         ([str(torus), *output, "--fix", "3", "--handle", "3", "0", "0", "0"], "fixed"),
         ([str(torus), *output, "--dxf"], "--strips"),
@@ -145,7 +150,7 @@ def test_quads_are_cut_into_triangles(tmp_path: Path, capsys: pytest.CaptureFixt
     circles = mesh.edges_along("u")
     line = mesh.topology.edges[circles][0]
     save_mesh(marked, mesh.vertices, mesh.topology, polylines=[line])
-    seed = [str(vertex) for vertex in line.tolist()]
+    seed = [str(vertex + 1) for vertex in line.tolist()]
     weights = {}
     (tmp_path / "even.json").write_text('{"evenness_weight": 0.0}')
     (tmp_path / "others.json").write_text('{"anchor_weight": 1e-4}')
@@ -165,7 +170,7 @@ def test_quads_are_cut_into_triangles(tmp_path: Path, capsys: pytest.CaptureFixt
         edges = PrincipalEdges(made.topology, load_edge_labels(output, made.topology)).check()
         found = {frozenset(pair) for pair in made.topology.edges[edges.mask].tolist()}
         assert number > 2 or found == {frozenset(pair) for pair in mesh.topology.edges[circles].tolist()}
-        report = json.loads((output.parent / "report.json").read_text())
+        report = report_in(output.parent)
         weights[number] = report["settings"]["evenness_weight"]
         assert report["holds"] == (number <= 2)
     assert weights == {0: 3.0, 1: 3.0, 2: 0.0, 3: 0.0, 4: 3.0}
@@ -198,9 +203,9 @@ def test_a_family_across_the_directions_is_warned_of(tmp_path: Path, capsys: pyt
     )
     save_mesh(tmp_path / "mesh.obj", mesh.vertices, mesh.topology)
     words = [str(tmp_path / "mesh.obj"), "-o", str(tmp_path / "x.obj"), "--no-pictures", "--steps", "2"]
-    main(["symmetric", *words, "--seed", *map(str, seed)])
+    main(["symmetric", *words, "--seed", *(str(vertex + 1) for vertex in seed)])
     out = capsys.readouterr().out
-    assert "WARNING: edges at random are 0.39 off" in out
+    assert "WARNING: edges at random are 22 degrees off" in out
     assert "--seed V W" in out
 
 
@@ -209,7 +214,7 @@ def test_strips_on_sheets_in_millimetres(torus: Path, capsys: pytest.CaptureFixt
     sheet = ["--strips", "0.2", "--millimetres", "100", "--sheet-width", "700", "--sheet-height", "300", "--gap", "4"]
     assert main(["symmetric", str(torus), "-o", str(output), "--no-pictures", *sheet]) == 0
     out = capsys.readouterr().out
-    report = json.loads((output.parent / "report.json").read_text())["strips"]
+    report = report_in(output.parent)["strips"]
     assert report["sheets"] > 1
     assert (report["sheet_width_millimetres"], report["sheet_height_millimetres"]) == pytest.approx((700.0, 300.0))
     assert f"on {report['sheets']} sheets of 700 x 300 mm" in out
@@ -229,7 +234,7 @@ def test_edges_that_cannot_be_turned_are_warned_of_at_once_and_the_remedy_works(
     out, err = capsys.readouterr()
     assert "E/C over that of the mesh that was given" in out.splitlines()[-1]
     first = err.splitlines()[0]
-    assert first.startswith("torchfair symmetric: warning: principal edges are 0.26 radians off")
+    assert first.startswith("torchfair symmetric: warning: principal edges are 15 degrees off")
     remedy = first.partition("anew: torchfair ")[2].partition(",")[0].split()
     assert remedy == ["mesh", str(turned), "--triangles", "200", "-o", "lattice.obj"]
     assert main([*remedy[:-1], str(laid), "--no-pictures", "--results", str(tmp_path / "laid")]) == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 import torch
@@ -351,3 +352,38 @@ def test_a_session_is_at_rest_as_soon_as_a_step_lowers_the_merit_by_little() -> 
     falls = [1.0 - after / before for before, after in itertools.pairwise(merits)]
     assert falls[-1] < 1e-2
     assert all(fall >= 1e-2 for fall in falls[:-1])
+
+
+WEIGHTS = [name.removesuffix("_weight") for name in vars(FairSettings()) if name.endswith("_weight")]
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "lifted"])
+@pytest.mark.parametrize("name", WEIGHTS)
+def test_a_weight_that_is_turned_is_the_weight_of_a_job_that_has_it_from_the_start(name: str, formulation: str) -> None:
+    vertices, topology = sheet()
+    given = {"formulation": formulation, "planar": "quads", "directions": "keep", "flat": (0, 1)}
+    if name == "free_boundary":
+        given["boundary"] = "free"
+    settings = FairSettings(**given)  # type: ignore[arg-type]
+    quads = Topology.from_faces(grid_faces(7, 7)) if name == "planarity" else topology
+
+    def felt(recipe: FairRecipe) -> list[tuple[str, float]]:
+        return [(term.name, term.weight) for term in recipe.problem.terms(1.0)]
+
+    session = Session(FairRecipe(vertices, quads, handles={MIDDLE: vertices[MIDDLE].tolist()}, settings=settings))
+    before = felt(session.recipe)
+    session.weigh(**{name: 7.0})
+    turned = replace(settings, **{f"{name}_weight": 7.0})
+    fresh = FairRecipe(vertices, quads, handles={MIDDLE: vertices[MIDDLE].tolist()}, settings=turned)
+    assert felt(session.recipe) == felt(fresh)
+    assert felt(session.recipe) != before or (name == "constraint" and formulation == "reduced")
+
+
+def test_without_the_weight_of_quality_no_bound_of_faces_is_kept() -> None:
+    session = opened()
+    problem = session.recipe.problem
+    thin = problem.vertices.clone()
+    thin[MIDDLE] = 0.98 * thin[MIDDLE + 1] + 0.02 * thin[MIDDLE]
+    assert not problem.guard.keeps_bounds({"vertices": thin})
+    session.weigh(quality=0.0)
+    assert problem.guard.keeps_bounds({"vertices": thin})

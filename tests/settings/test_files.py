@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +15,6 @@ from torchfair.formfinding import FairSettings, FormSettings, SymmetricSettings
 from torchfair.linear import ScipyDirect
 from torchfair.projection import ProjectionSettings
 from torchfair.settings import plain_settings, read_settings, settings_from
-
-needs_toml = pytest.mark.skipif(sys.version_info < (3, 11), reason="tomllib came with Python 3.11")
 
 
 def written(path: Path, values: object) -> Path:
@@ -52,7 +49,6 @@ def test_what_a_file_does_not_name_has_the_default_of_the_job(tmp_path: Path) ->
     assert read_settings(written(path, {}), FairSettings) == FairSettings()
 
 
-@needs_toml
 def test_toml_has_the_same_fields_with_none_as_a_word_and_angles_also_in_degrees(tmp_path: Path) -> None:
     text = """
     distance_limit = "none"
@@ -99,7 +95,6 @@ def test_faults_are_named_with_file_field_and_what_is_allowed(name: str, tmp_pat
         assert word in str(caught.value)
 
 
-@needs_toml
 def test_broken_toml_is_named(tmp_path: Path) -> None:
     path = written(tmp_path / "mine.toml", "smoothing = \n")
     with pytest.raises(SettingsError, match=r"mine\.toml: .*line 1"):

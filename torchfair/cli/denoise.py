@@ -22,14 +22,14 @@ class DenoiseCommand(JobCommand):
     purpose = "remove noise from a scanned mesh, and keep its edges"
     description = (
         "Moves the vertices of a noisy mesh as little as makes its normal variation E small: faces become flat and "
-        "edges stay sharp. Estimates how much noise there is. Writes the mesh, report.json and a picture of before and "
+        "edges stay sharp. Estimates how much noise there is. Writes the mesh, a report and a picture of before and "
         "after. Best on bodies of flat and singly curved faces; --curved for organic shapes."
     )
     pictures: ClassVar[Mapping[str, Writer]] = {"before_after.png": draw_before_after}
 
     def settings(self) -> type[Any]:
         """See the base class."""
-        from ..formfinding import DenoiseSettings
+        from ..settings.denoise_settings import DenoiseSettings
 
         return DenoiseSettings
 

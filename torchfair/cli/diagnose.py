@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..io.json_text import to_json
 from .arguments import count
+from .chosen_vertices import NUMBERS, ChosenVertices
 from .errors import CommandError
 from .inputs import add_repair, read_input
-from .outputs import refuse_existing
 from .reading import said_of
+from .told_files import told_files, written_with_report
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
@@ -58,9 +58,11 @@ def add_parser(subparsers: Any) -> None:
     add("--json", action="store_true", help="print one JSON object instead of tables")
     add("--per-vertex", action="store_true", help="with --json or --output: list the class of every vertex")
     add("--worst", type=count, default=10, metavar="N", help="list the N worst vertices (default 10)")
-    add("-o", "--output", metavar="FOLDER", help=f"folder for {REPORT} and pictures; nothing is written without it")
-    add("--vertex", type=count, action="append", default=[], metavar="V", help="draw the normal pyramid of this vertex "
-        "(counted from 0); repeatable; by default of the worst, then of some of each class")  # fmt: skip
+    add(
+        "-o", "--output", metavar="FOLDER", help=f"folder for NAME.{REPORT} and pictures; nothing is written without it"
+    )
+    add("--vertex", action="append", default=[], metavar="VERTEX ...", help="draw the normal pyramids of these "
+        f"vertices: {NUMBERS}, or 'near X Y Z'; by default of the worst, then of some of each class")  # fmt: skip
     add("--no-pictures", action="store_true", help="write no pictures")
     add("--force", action="store_true", help="replace files that exist")
     add_repair(parser)
@@ -73,10 +75,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     files = _files(arguments)
     mesh = read_input(arguments.input, arguments)
-    _check_vertices(arguments.vertex, mesh)
+    chosen = ChosenVertices(mesh)
+    drawn = _drawn(arguments, chosen)
     diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
     numbers, worst = diagnosis.counts(), diagnosis.worst_vertices(arguments.worst)
-    advice = layout_advice(mesh.vertices, mesh.topology, diagnosis)
+    advice = layout_advice(mesh.vertices, mesh.topology, diagnosis, names=mesh.names)
     _explain(worst, mesh)
     report = {
         **numbers,
@@ -89,11 +92,13 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.per_vertex:
         report["per_vertex"] = diagnosis.per_vertex()
     if files:
-        write(files, mesh, diagnosis, report, arguments)
+        write(files, mesh, diagnosis, report, drawn, arguments)
     if arguments.json:
+        from ..io import to_json
+
         sys.stdout.write(to_json(report))
         return 0
-    for line in said_of(mesh):
+    for line in [*said_of(mesh), *(f"note: {note}" for note in chosen.notes)]:
         print(line)
     print(f"{arguments.input}\n{format_counts(numbers)}")
     if worst:
@@ -105,28 +110,41 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def write(
-    files: list[Path], mesh: PolygonMesh, diagnosis: Diagnosis, report: dict[str, Any], arguments: argparse.Namespace
+    files: list[Path],
+    mesh: PolygonMesh,
+    diagnosis: Diagnosis,
+    report: dict[str, Any],
+    drawn: list[int],
+    arguments: argparse.Namespace,
 ) -> None:
-    """Writes report and pictures, each whole or not at all."""
-    from ..io import atomic_write_text
+    """Writes report and pictures, all or nothing; ``drawn`` vertices have their pyramids drawn."""
+    with written_with_report(files, report, arguments):
+        if len(files) > 1:
+            _draw(files[1:], mesh, diagnosis, report, drawn, force=arguments.force)
 
-    files[0].parent.mkdir(parents=True, exist_ok=True)
-    atomic_write_text(files[0], to_json(report), overwrite=arguments.force)
-    if len(files) == 1:
-        return
+
+def _draw(
+    files: list[Path],
+    mesh: PolygonMesh,
+    diagnosis: Diagnosis,
+    report: dict[str, Any],
+    drawn: list[int],
+    *,
+    force: bool,
+) -> None:
     from ..io import save_mesh
     from ..viewing.picture_gauss_image import picture_gauss_image
     from ..viewing.picture_pyramids import picture_pyramids
     from ..viewing.picture_star_classes import picture_star_classes, star_class_colors
 
     vertices, topology, classes, crossings = mesh.vertices, mesh.topology, diagnosis.classes, diagnosis.crossings
-    overview, pyramids, sphere, colored = files[1:]
-    picture_star_classes(overview, vertices, classes, crossings, overwrite=arguments.force)
-    chosen = arguments.vertex or _instructive(diagnosis, report["worst_vertices"])
-    picture_pyramids(pyramids, vertices, classes, crossings, chosen, overwrite=arguments.force)
-    picture_gauss_image(sphere, vertices, topology, crossings, overwrite=arguments.force)
+    overview, pyramids, sphere, colored = files
+    picture_star_classes(overview, vertices, classes, crossings, overwrite=force)
+    chosen = drawn or _instructive(diagnosis, report["worst_vertices"])
+    picture_pyramids(pyramids, vertices, classes, crossings, chosen, names=mesh.names, overwrite=force)
+    picture_gauss_image(sphere, vertices, topology, crossings, overwrite=force)
     colors = star_class_colors(classes)
-    save_mesh(colored, vertices, topology, overwrite=arguments.force, binary=True, colors=colors)
+    save_mesh(colored, vertices, topology, overwrite=force, binary=True, colors=colors)
 
 
 def format_counts(numbers: dict[str, Any]) -> str:
@@ -160,16 +178,14 @@ def format_vertices(worst: list[dict[str, Any]], first_number: int = 0) -> str:
     """The worst vertices as a table, and what each of them needs."""
     lines = [
         "",
-        "worst vertices (counted from 0, as for --vertex, and as in the file, from "
-        f"{first_number}, by which edges to flip are named, too; perimeter of the normal pyramid in degrees; "
+        f"worst vertices (numbers as in the file, from {first_number}; perimeter of the normal pyramid in degrees; "
         "edges above and below the plane at the normal)",
-        f"  {'vertex':>9} {'in file':>9} {'valence':>8} {'class':>12} {'crossings':>10} {'perimeter':>10}  "
-        f"{'x y z':<32}  edges",
+        f"  {'vertex':>9} {'valence':>8} {'class':>12} {'crossings':>10} {'perimeter':>10}  {'x y z':<32}  edges",
     ]
     for row in worst:
         place = "{:.6g} {:.6g} {:.6g}".format(*row["position"])
         lines.append(
-            f"  {row['vertex']:>9} {row['number_in_file']:>9} {row['valence']:>8} {row['class']:>12} "
+            f"  {row['number_in_file']:>9} {row['valence']:>8} {row['class']:>12} "
             f"{row['self_intersections']:>10} {row['perimeter_degrees']:>10.4g}  {place:<32}  {row['pattern_words']}"
         )
         lines.append(f"  {'':>9} {_remedy_words(row['remedy'])}")
@@ -203,18 +219,18 @@ def _files(arguments: argparse.Namespace) -> list[Path]:
             raise CommandError("--vertex draws a picture and needs a folder for it: --output FOLDER")
         return []
     pictures = () if arguments.no_pictures else (*PICTURES, COLORED)
-    files = [Path(arguments.output) / name for name in (REPORT, *pictures)]
-    refuse_existing(files, force=arguments.force)
-    return files
+    return told_files(arguments, (REPORT, *pictures))
 
 
-def _check_vertices(chosen: list[int], mesh: PolygonMesh) -> None:
-    topology = mesh.topology
-    for vertex in chosen:
-        if vertex >= topology.num_vertices:
-            raise CommandError(f"--vertex {vertex}: numbers run from 0 to {topology.num_vertices - 1}")
-        if topology.is_boundary_vertex[vertex] or not topology.valences[vertex]:
-            raise CommandError(f"--vertex {vertex}: it is not inside the mesh and has no normal pyramid")
+def _drawn(arguments: argparse.Namespace, chosen: ChosenVertices) -> list[int]:
+    """The vertices of ``--vertex``."""
+    mesh = chosen.mesh
+    found = [vertex for words in arguments.vertex for vertex in chosen.of("--vertex", words)]
+    for vertex in found:
+        if mesh.topology.is_boundary_vertex[vertex] or not mesh.topology.valences[vertex]:
+            name = mesh.names.vertex(vertex)
+            raise CommandError(f"--vertex {name}: it is not inside the mesh and has no normal pyramid")
+    return found
 
 
 def _instructive(diagnosis: Diagnosis, worst: list[dict[str, Any]]) -> list[int]:

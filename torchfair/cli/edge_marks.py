@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..io import PolygonMesh
     from ..subdivision import Refinement
     from ..topology import Topology
-    from .outputs import Writer
+    from .outputs import Report, Writer
 
 
 def marks_file(arguments: argparse.Namespace) -> Path | None:
@@ -35,12 +35,9 @@ def marks_file(arguments: argparse.Namespace) -> Path | None:
     return path if path.exists() else None
 
 
-def file_of_marks(output: Path) -> Path | None:
-    """The file that is to hold marks of edges beside the mesh ``output``; None where the mesh itself holds them."""
-    from ..io import edge_labels_path
-
-    path = edge_labels_path(output)
-    return None if path == output else path
+def end_of_marks(output: Path) -> str | None:
+    """End of the name of the file that is to hold marks of edges beside a mesh; None where the mesh holds them."""
+    return None if output.suffix.lower() == ".obj" else ".edges.json"
 
 
 def _has_lines(path: Path) -> bool:
@@ -95,12 +92,12 @@ class MarkedOutputs(Outputs):
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
         super().__init__(arguments, pictures)
         self._marks: Tensor | None = None
-        beside = file_of_marks(self.mesh)
+        beside = end_of_marks(self.mesh)
         self._in_mesh = beside is None
         if beside is not None and Path(arguments.input).is_file() and marks_file(arguments) is not None:
             self.beside = {beside: self._save}
 
-    def write_mesh(self, request: Request, result: Any) -> None:
+    def save(self, request: Request, result: Any, report: Report) -> None:
         """See the base class."""
         from ..subdivision import hybrid
 
@@ -110,7 +107,7 @@ class MarkedOutputs(Outputs):
             self._marks = request.marks
             for level in result.levels[:-1]:
                 self._marks, _ = carried("auto", self._marks, hybrid(level.topology))
-        super().write_mesh(request, result)
+        super().save(request, result, report)
 
     def polylines(self, result: Any) -> Sequence[Tensor]:
         """Marked edges, unless they stand in a file beside."""

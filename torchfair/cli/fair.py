@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from .chosen_vertices import ChosenVertices, faces_of_file
 from .edge_marks import MarkedOutputs, read_marks
 from .inputs import (
     add_fixed,
@@ -41,6 +43,9 @@ def _gauss_images(path: Path, request: Request, result: JobResult[Level], overwr
     picture_gauss_images(path, request.mesh.vertices, result.vertices, both, overwrite=overwrite)
 
 
+_PLANAR = "settings.planar"  # faces that the option names are counted as in the file, those of settings files from 0
+
+
 class FairCommand(JobCommand):
     """Lowers E near a reference surface."""
 
@@ -48,7 +53,7 @@ class FairCommand(JobCommand):
     purpose = "make a mesh look smoother"
     description = (
         "Lowers the normal variation E of a polygon mesh by sliding its vertices along the surface, and writes the "
-        "mesh, report.json and pictures of before and after. Lengths are in mean edge lengths of the input."
+        "mesh, a report and pictures of before and after. Lengths are in mean edge lengths of the input."
     )
     option_names: ClassVar[Mapping[str, str]] = {"distance_limit": "distance"}
     pictures: ClassVar[Mapping[str, Writer]] = {
@@ -59,7 +64,7 @@ class FairCommand(JobCommand):
 
     def settings(self) -> type[Any]:
         """See the base class."""
-        from ..formfinding import FairSettings
+        from ..settings.fair_settings import FairSettings
 
         return FairSettings
 
@@ -85,13 +90,16 @@ class FairCommand(JobCommand):
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""
         mesh = read_input(arguments.input, arguments)
+        chosen = ChosenVertices(mesh)
+        if _PLANAR in arguments and not isinstance(settings.planar, str):
+            settings = replace(settings, planar=faces_of_file("--planar", settings.planar, mesh))
         options = {
             "reference": read_reference(arguments),
-            "handles": read_handles(arguments, mesh),
+            "handles": read_handles(arguments, chosen),
             "levels": arguments.levels,
-            "fixed": read_fixed(arguments, mesh),
+            "fixed": read_fixed(arguments, chosen),
         }
-        return Request(mesh, options, marks=read_marks(mesh, arguments))
+        return Request(mesh, options, notes=chosen.notes, marks=read_marks(mesh, arguments), settings=settings)
 
 
 COMMAND = FairCommand()

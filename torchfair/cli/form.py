@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .arguments import positive_count
+from .chosen_vertices import ChosenVertices
 from .form_inputs import read_form_input
 from .form_mesh import FormOutputs, add_mesh
 from .inputs import add_handles, add_levels, add_repair, read_handles
@@ -43,7 +44,7 @@ class FormCommand(JobCommand):
 
     def settings(self) -> type[Any]:
         """See the base class."""
-        from ..formfinding import FormSettings
+        from ..settings.form_settings import FormSettings
 
         return FormSettings
 
@@ -82,10 +83,11 @@ class FormCommand(JobCommand):
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""
         start = read_form_input(arguments, settings.corner_angle)
+        chosen = ChosenVertices(start.mesh, start.notes)
         options = {
             "curves": start.curves or None,
             "normals": start.normals,
-            "handles": read_handles(arguments, start.mesh) | start.nearest(arguments.through),
+            "handles": read_handles(arguments, chosen) | start.nearest(arguments.through),
             "levels": arguments.levels,
             "remesh": arguments.remesh or arguments.input is None,
             "starts": arguments.starts or (_STARTS if arguments.input is None else 1),

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from .arguments import positive_count
 from .mesh import draw_singular, table
-from .outputs import Outputs, Request, Writer, save_result
+from .outputs import Outputs, Request, Writer
+from .result_files import save_result
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
@@ -39,25 +40,23 @@ class FormOutputs(Outputs):
         self._count: int | None = arguments.mesh
         self._made: QuadMesh | None = None
         if self._count is not None:
-            self.beside = {self.mesh.with_name(f"{self.mesh.stem}-quads{self.mesh.suffix}"): self._save}
+            self.late = {f"-quads{self.names.suffix}": self._save}
             if self.pictures:
-                self.pictures[self.folder / _PICTURE] = self._draw
+                self.pictures[_PICTURE] = self._draw
 
-    def write_mesh(self, request: Request, result: Any) -> None:
-        """Writes the surface, meshes it, and writes the quads; says why if there are none."""
-        beside, self.beside = self.beside, {}
-        super().write_mesh(request, result)
+    def more(self, request: Request, result: Any) -> bool:
+        """Meshes the surface; says why if there are no quads."""
         if self._count is None:
-            return
+            return False
         reason = self._make(self._count, request, result)
         if reason:
-            self.pictures.pop(self.folder / _PICTURE, None)
+            self.pictures.pop(_PICTURE, None)
+            late, self.late = self.late, {}
             request.report["principal_quads"] = {"not_reached": reason}
-            old = "".join(f"; {path} is of an earlier run" for path in beside if path.exists())
-            request.missed.append(f"principal quads (--mesh {self._count}): NOT REACHED; {reason}{old}")
-        else:
-            self.beside = beside
-            self._write(beside, request, result)
+            old = [path for path in map(self.names.beside, late) if path.exists()]
+            words = "".join(f"; {path} is of an earlier run" for path in old)
+            request.missed.append(f"principal quads (--mesh {self._count}): NOT REACHED; {reason}{words}")
+        return True
 
     def lines(self) -> list[str]:
         """Measures of the quads."""

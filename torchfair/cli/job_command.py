@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from .._names import FROM_ZERO
 from .exit_codes import IN_WORDS, exit_code
 from .options import SettingOptions
 from .outputs import Outputs, Request, Writer, add_outputs, asked_for
@@ -97,22 +98,25 @@ class JobCommand(ABC):
         outputs.prepare()
         request = self.read(arguments, settings)
         settings = request.settings or settings
-        outputs.make_folders()
+        outputs.make_folders(request.mesh, getattr(arguments, "levels", 0))
         for warning in request.warnings:
             print(f"{self.name}: warning: {warning}", file=sys.stderr, flush=True)
         mesh = request.mesh
         with in_numbers_of(mesh):
             result = self._solve(request, settings)
-        outputs.write_mesh(request, result)
-        missed = [*missed_lines(result, getattr(arguments, "levels", 0)), *request.missed]
+        outputs.save(request, result, lambda: self._report(arguments, request, result, settings))
+        levels = getattr(arguments, "levels", 0)
+        names = mesh.names if len(result.levels) == 1 else FROM_ZERO  # finer meshes have their own numbers
+        missed = [*missed_lines(result, levels, names), *request.missed]
+        plain = [*missed_lines(result, levels), *request.missed]
         lines = [
-            *note_lines(mesh.repairs, [*mesh.notes, *request.notes, *result.notes], missed),
+            *note_lines(mesh.repairs, [*mesh.notes, *request.notes, *result.notes], plain),
             *measures_table(result.before, result.after),
             *kept_lines(result),
             *work_lines(result),
             *outputs.lines(),
         ]
-        outputs.finish(request, result, lines, self._report(arguments, request, result, settings), missed)
+        outputs.finish(request, result, lines, missed)
         return exit_code(result.projection.status, missed, interrupted=request.interrupted)
 
     def _solve(self, request: Request, settings: Any) -> JobResult[Any]:

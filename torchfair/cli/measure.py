@@ -6,7 +6,6 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from ..io.json_text import to_json
 from .arguments import count
 from .errors import CommandError
 from .inputs import add_reference, add_repair, read_input, read_reference
@@ -111,6 +110,8 @@ def run(arguments: argparse.Namespace) -> int:
             **lists,
             "curvature_doubts": doubts,
         }
+        from ..io import to_json
+
         sys.stdout.write(to_json({**{quantity.key: quantity.value for quantity in quantities}, **entries}))
     else:
         for line in said_of(mesh):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .arguments import positive_count
-from .edge_marks import file_of_marks
+from .edge_marks import end_of_marks
 from .errors import CommandError
 from .exit_codes import IN_WORDS, exit_code
 from .inputs import add_repair, read_input
@@ -83,7 +83,7 @@ def fill(parser: CommandParser) -> None:
 
 def options() -> SettingOptions[MeshingSettings]:
     """The options that are settings."""
-    from ..meshing import MeshingSettings
+    from ..settings.meshing_settings import MeshingSettings
 
     return SettingOptions(MeshingSettings, "mesh", {})
 
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     outputs = MeshOutputs(arguments, {"mesh.png": draw_singular, "edges.png": _edges})
     outputs.prepare()
     surface = read_input(arguments.input, arguments)
-    outputs.make_folders()
+    outputs.make_folders(surface, 0)
     began = time.perf_counter()
     with in_numbers_of(surface):
         made = _made(surface, arguments, settings)
@@ -106,13 +106,13 @@ def run(arguments: argparse.Namespace) -> int:
     status = None
     if arguments.planar:
         made, missed, status = made_planar(made, surface)
-    request = Request(surface, {})
-    outputs.write_mesh(request, made)
+    request, seconds = Request(surface, {}), time.perf_counter() - began
+    report = _report(arguments, made, settings, missed, seconds) | read_report(surface)
+    outputs.save(request, made, lambda: report)
     notes = [*surface.notes, *made.notes, *request.notes]
     lines = [*note_lines(surface.repairs, notes, missed), *table(made.report)]
-    report = _report(arguments, made, settings, missed, time.perf_counter() - began) | read_report(surface)
-    outputs.finish(request, made, lines, report, missed)
-    return exit_code(status, missed)
+    outputs.finish(request, made, lines, missed)
+    return exit_code(status, missed, interrupted=request.interrupted)
 
 
 def _made(surface: PolygonMesh, arguments: argparse.Namespace, settings: MeshingSettings) -> Any:
@@ -128,7 +128,7 @@ class MeshOutputs(Outputs):
 
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
         super().__init__(arguments, pictures)
-        beside = file_of_marks(self.mesh)
+        beside = end_of_marks(self.mesh)
         if arguments.triangles and beside is not None:
             self.beside = {beside: _labels}
 

@@ -80,8 +80,8 @@ class SettingOptions(Generic[S]):
         group.add_argument(
             "--settings",
             metavar="FILE",
-            help=f"TOML or JSON file of settings, such as the report.json of an earlier 'torchfair {self._job}', whose "
-            "result is found again",
+            help=f"TOML or JSON file of settings, such as NAME.report.json of an earlier 'torchfair {self._job}', "
+            "whose result is found again",
         )
         if self._presets:
             group.add_argument(

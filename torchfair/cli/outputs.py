@@ -5,21 +5,26 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._interrupts import deferred_interrupts
+from ..errors import TorchfairError
+from .elsewhere import places
 from .errors import CommandError
+from .output_checks import make_folders, refuse_report_of_another, refuse_taken, refuse_unknown_format, remove
+from .output_names import FILES, OutputNames, listed, listed_in
+from .result_files import save_result
 
 if TYPE_CHECKING:
     from torch import Tensor
 
     from ..io import PolygonMesh
-    from ..topology import Topology
 
 _NOT_ASKED = ("run", "name", "version")
-_MESH_FORMATS = (".obj", ".off", ".ply", ".stl", ".glb", ".3dm")
-_WITH_ATTRIBUTES = (".obj", ".3dm")
-_TRIANGLES = (".stl", ".glb")
+_BYTES = 200  # of a vertex and its faces as text, about
+_BYTES_OF_OTHERS = 1_000_000  # of a report or a picture
 
 
 @dataclass
@@ -34,7 +39,7 @@ class Request:
         warnings: What is likely to fail, and what to do instead; said before it is tried.
         marks: Marked edges (E,) of the mesh, which go with it; None for none.
         settings: To solve with; by default those that options ask for.
-        report: Entries of ``report.json`` beside those that all jobs have.
+        report: Entries of the report beside those that all jobs have.
         missed: What was asked for beside the job and is not there, in words.
         interrupted: Whether what comes after the job was interrupted.
     """
@@ -53,53 +58,79 @@ class Request:
 
 Writer = Callable[[Path, Any, Any, bool], object]
 """Writes one file from its path, the request, the result, and whether it may replace a file."""
+Report = Callable[[], Mapping[str, Any]]
+"""Makes the entries of a report."""
 
 
 class Outputs:
-    """Mesh, report and others; each is written whole or not at all, the mesh first.
+    """Mesh, report and others, all named after the mesh.
+
+    Mesh and report are written first, and together: both are there, or neither, and pictures of an earlier run are gone
+    with its report. Where they cannot be written they are kept elsewhere, see :func:`~.elsewhere.places`.
 
     Args:
         arguments: Of the command.
-        pictures: Writers by name of the file.
+        pictures: Writers by end of the name.
 
     Attributes:
-        mesh, folder, report: Where they go.
-        beside: Writers by path of what is written with the mesh.
-        others: Writers by path of what is written at last.
+        names: Where they go; elsewhere, once they could not be written there.
+        beside: Writers of what is written with the mesh, by end of the name.
+        late: Writers of what :meth:`more` has made, beside the mesh, too.
+        pictures, others: Writers of what is written at last, by end of the name.
         force: Whether files may be replaced.
     """
 
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
-        self.mesh, self.force = Path(arguments.output), arguments.force
-        self.folder = self.mesh.parent if arguments.results is None else Path(arguments.results)
-        self.report = self.folder / "report.json"
-        drawn = {} if arguments.no_pictures else pictures
-        self.pictures = {self.folder / name: writer for name, writer in drawn.items()}
-        self.beside: dict[Path, Writer] = {}
-        self.others: dict[Path, Writer] = {}
+        self.names, self.force = OutputNames.of(arguments.output, arguments.results), arguments.force
+        self.pictures: dict[str, Writer] = {} if arguments.no_pictures else dict(pictures)
+        self.beside: dict[str, Writer] = {}
+        self.late: dict[str, Writer] = {}
+        self.others: dict[str, Writer] = {}
+        self._faults: list[str] = []
+        self._lacking: list[Path] = []
 
-    def paths(self) -> list[Path]:
+    @property
+    def mesh(self) -> Path:
+        """The mesh."""
+        return self.names.output
+
+    @property
+    def report(self) -> Path:
+        """The report."""
+        return self.names.side("report.json")
+
+    def paths(self, names: OutputNames | None = None) -> list[Path]:
         """All files, in the order in which they are written."""
-        return [self.mesh, *self.beside, self.report, *self.pictures, *self.others]
+        names = names or self.names
+        ends = [*self.beside, *self.late]
+        told = ["report.json", *self.pictures, *self.others]
+        return [names.output, *(names.beside(end) for end in ends), *(names.side(end) for end in told)]
+
+    # ---- before the job --------------------------------------------------------------------------------
 
     def prepare(self) -> None:
-        """Refuses unknown mesh formats and, unless forced, files that exist."""
+        """Refuses unknown mesh formats, names that are taken, and places where nothing can be written."""
         refuse_unknown_format(self.mesh)
-        refuse_existing(self.paths(), force=self.force)
+        refuse_taken(self.paths(), force=self.force)
+        refuse_report_of_another(self.report, self.mesh)
 
-    def make_folders(self) -> None:
+    def make_folders(self, mesh: PolygonMesh, levels: int) -> None:
         """Makes the folders of all files, so that a solve does not end with nowhere to write."""
-        for folder in {self.mesh.parent, self.folder}:
-            folder.mkdir(parents=True, exist_ok=True)
+        size = _BYTES * mesh.topology.num_vertices * 4**levels + _BYTES_OF_OTHERS * len(self.paths())
+        make_folders(self.paths(), size)
 
-    def write_mesh(self, request: Request, result: Any) -> None:
-        """Writes what must not be lost."""
-        lines = self.polylines(result)
-        request.notes += save_result(
-            self.mesh, result.vertices, result.topology, request.mesh, force=self.force, polylines=lines,
-            marks=bool(len(lines) or self.beside),
-        )  # fmt: skip
-        self._write(self.beside, request, result)
+    # ---- after it --------------------------------------------------------------------------------------
+
+    def save(self, request: Request, result: Any, report: Report) -> None:
+        """Writes what must not be lost, then makes more and writes that with the report; Ctrl-C waits meanwhile."""
+        with deferred_interrupts():
+            self._keep(request, result, report)
+        if self.more(request, result):
+            self._attempt(partial(self._together, self.late, request, result, report), self.report)
+
+    def more(self, request: Request, result: Any) -> bool:
+        """Makes what takes long once the mesh is safe; whether the report has to be written anew."""
+        return False
 
     def polylines(self, result: Any) -> Sequence[Tensor]:
         """Vertices of line elements of an OBJ file."""
@@ -109,112 +140,98 @@ class Outputs:
         """What is said of what was written beside the mesh."""
         return []
 
-    def write_others(self, report: Mapping[str, Any], request: Request, result: Any) -> None:
-        """Writes the rest."""
-        from ..io import write_report
+    def finish(self, request: Request, result: Any, lines: Sequence[str], missed: Sequence[str]) -> None:
+        """Says what came out, draws and writes the rest, and says where it is and what was missed.
 
-        write_report(self.report, report, overwrite=self.force)
-        self._write(self.pictures | self.others, request, result)
-
-    def finish(
-        self, request: Request, result: Any, lines: Sequence[str], report: Mapping[str, Any], missed: Sequence[str]
-    ) -> None:
-        """Says what came out, writes the rest, and says where it is and what was missed."""
+        Raises:
+            CommandError: something could not be written where it was to go; says what, and where it is instead.
+        """
         print("\n".join(lines), flush=True)
-        self.write_others(report, request, result)
-        print("\n".join([*(f"wrote {path}" for path in self.paths()), *missed]))
+        rest = {self.names.side(end): writer for end, writer in (self.pictures | self.others).items()}
+        try:
+            for path, writer in rest.items():
+                self._attempt(partial(writer, path, request, result, self.force), path)
+        except KeyboardInterrupt:
+            request.interrupted = True
+            self._lacking += [path for path in rest if not path.exists()]
+        there = [path for path in self.paths() if path not in self._lacking]
+        lost = [f"not written: {path}" for path in self._lacking] if request.interrupted else []
+        print("\n".join([*(f"wrote {path}" for path in there), *lost, *missed]))
+        if self._faults:
+            raise CommandError("; ".join(self._faults))
 
-    def _write(self, files: Mapping[Path, Writer], request: Request, result: Any) -> None:
-        for path, writer in files.items():
-            writer(path, request, result, self.force)
+    def _keep(self, request: Request, result: Any, report: Report) -> None:
+        asked, old, fault = self.names, listed_in(self.report, self.names.stem) if self.force else [], None
+        for names in places(asked, self.paths):
+            self.names = names
+            try:
+                notes = self._mesh_and_report(request, result, report)
+            except (TorchfairError, OSError) as error:
+                fault = fault or error
+                self.force = False
+                continue
+            request.notes += notes
+            if fault is None:
+                self._remove([*old, *(path for path in self.paths() if self.force)], {self.mesh, self.report})
+            else:
+                self._faults.append(f"{_words(fault)}; the mesh is {self.mesh} instead, its report {self.report}")
+            return
+        assert fault is not None
+        raise fault
+
+    def _mesh_and_report(self, request: Request, result: Any, report: Report) -> list[str]:
+        """Writes both, and what stands beside the mesh; what the file of the mesh does not hold."""
+        from ..io import written_together
+
+        lines = self.polylines(result)
+        with written_together():
+            notes = save_result(
+                self.mesh, result.vertices, result.topology, request.mesh, force=self.force, polylines=lines,
+                marks=bool(len(lines) or self.beside),
+            )  # fmt: skip
+            self._together(self.beside, request, result, report)
+        return notes
+
+    def _together(self, beside: Mapping[str, Writer], request: Request, result: Any, report: Report) -> None:
+        """Writes files beside the mesh and the report, all or none."""
+        from ..io import write_report, written_together
+
+        with written_together():
+            for end, writer in beside.items():
+                writer(self.names.beside(end), request, result, self.force)
+            entries = {**report(), FILES: listed(self.paths(), self.report)}
+            write_report(self.report, entries, overwrite=self.force or beside is self.late)
+
+    def _remove(self, files: Sequence[Path], new: set[Path]) -> None:
+        """Removes files of an earlier run, which are not of this one."""
+        new |= {self.names.beside(end) for end in self.beside}
+        remove(set(files) - new - {self.names.beside(end) for end in self.late})
+
+    def _attempt(self, write: Callable[[], object], path: Path) -> None:
+        """Writes something that one can do without; takes note if that fails."""
+        try:
+            write()
+        except (TorchfairError, OSError) as error:
+            self._faults.append(_words(error))
+            self._lacking.append(path)
 
 
-def not_held(path: Path, source: PolygonMesh, *, same: bool, marks: bool) -> list[str]:
-    """What of the file of a mesh another file does not hold, in words.
-
-    Args:
-        path: The other file.
-        source: The mesh that was read.
-        same: Whether the faces are those of the source.
-        marks: Whether line elements of the source are carried on.
-    """
-    left_out = "" if source.attributes is None else source.attributes.left_out(path.suffix.lower(), same, marks)
-    return [f"{path.name} does not hold {left_out} of the input"] if left_out else []
-
-
-def save_result(
-    path: Path,
-    vertices: Tensor,
-    topology: Topology,
-    source: PolygonMesh,
-    *,
-    force: bool,
-    polylines: Sequence[Tensor] = (),
-    marks: bool = False,
-) -> list[str]:
-    """Writes a mesh that was made from another one, and says what of the file of that it does not hold.
-
-    Groups, materials, texture coordinates and colours of an OBJ file are written back where the faces are the same;
-    polygons are cut into triangles where the format has no others.
-
-    Args:
-        path: The file.
-        vertices: (V, 3) of the mesh.
-        topology: Of the mesh.
-        source: What it was made from.
-        force: Whether a file may be replaced.
-        polylines: Line elements of an OBJ file.
-        marks: Whether line elements of the source are carried on.
-    """
-    from ..io import RhinoParts, save_mesh
-
-    suffix, notes = path.suffix.lower(), []
-    attributes = source.attributes
-    same = topology.corners.equal(source.topology.corners) and topology.face_offsets.equal(source.topology.face_offsets)
-    notes += not_held(path, source, same=same, marks=marks)
-    if suffix in _TRIANGLES and not topology.is_triangular:
-        from ..topology import Topology
-        from ..triangulation import triangulate
-
-        notes.append(f"{path.name} holds its polygons cut into triangles: {suffix} files have no others")
-        topology = Topology.from_faces(triangulate(vertices, topology).triangles, topology.num_vertices)
-    kept = attributes if same else None
-    if isinstance(attributes, RhinoParts):
-        kept = attributes if same else attributes.of_other_faces(topology.num_faces)
-    if isinstance(kept, RhinoParts) != (suffix == ".3dm") or suffix not in _WITH_ATTRIBUTES:
-        kept = None
-    save_mesh(path, vertices, topology, overwrite=force, polylines=polylines, attributes=kept)
-    return notes
+def _words(error: Exception) -> str:
+    if isinstance(error, OSError):
+        return f"{error.filename or 'a file'}: {error.strerror or error}"
+    return str(error)
 
 
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Adds the options that say where they go."""
     add = parser.add_argument
-    add(
-        "-o",
-        "--output",
-        required=True,
-        metavar="OUTPUT",
-        help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM)",
-    )
-    add("--results", metavar="FOLDER", help="folder of report.json and all else (default: that of OUTPUT)")
+    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM); "
+        "what belongs to it is named after it: NAME.report.json and others")  # fmt: skip
+    add("--results", metavar="FOLDER", help="folder of NAME.report.json and all else (default: that of OUTPUT)")
     add("--no-pictures", action="store_true", help="write no pictures")
-    add("--force", action="store_true", help="replace files that exist")
+    add("--force", action="store_true", help="replace files that exist, and remove pictures of the earlier run")
 
 
 def asked_for(arguments: argparse.Namespace) -> dict[str, Any]:
     """Arguments by name for a report, without settings."""
     return {name: value for name, value in vars(arguments).items() if name not in _NOT_ASKED and "." not in name}
-
-
-def refuse_unknown_format(path: Path) -> None:
-    """Refuses names of mesh files that do not say how to write them."""
-    if path.suffix.lower() not in _MESH_FORMATS:
-        raise CommandError(f"cannot write '{path}': choose a name that ends in {', '.join(_MESH_FORMATS)}")
-
-
-def refuse_existing(paths: Sequence[Path], *, force: bool) -> None:
-    """Refuses files that exist, unless they may be replaced."""
-    existing = [str(path) for path in paths if path.exists()]
-    if existing and not force:
-        raise CommandError(f"{', '.join(existing)} exists: choose another folder, or --force to replace")

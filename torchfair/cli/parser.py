@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
+from .chosen_vertices import joined_places
 from .errors import CommandError
 from .reading import with_default_tolerance
 
@@ -32,7 +33,7 @@ class CommandParser(argparse.ArgumentParser):
         if fill is not None:
             fill(self)
         words = list(sys.argv[1:] if not args or args[0] is None else args[0])
-        return super().parse_known_args(with_default_tolerance(words), *args[1:], **kwargs)
+        return super().parse_known_args(joined_places(with_default_tolerance(words)), *args[1:], **kwargs)
 
     def error(self, message: str) -> NoReturn:
         """Refuses the arguments."""

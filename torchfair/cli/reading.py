@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from .._names import PlacedError
 from ..errors import MeshError
 
 if TYPE_CHECKING:
@@ -77,6 +76,8 @@ def read_report(mesh: PolygonMesh) -> dict[str, Any]:
 @contextmanager
 def in_numbers_of(mesh: PolygonMesh) -> Iterator[None]:
     """Errors name vertices and faces as the file of the mesh does."""
+    from .._names import PlacedError
+
     try:
         yield
     except PlacedError as error:

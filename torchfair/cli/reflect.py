@@ -7,13 +7,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..io.json_text import to_json
 from .arguments import count, positive_count, positive_or_none
 from .errors import CommandError
 from .exit_codes import EXIT_NOT_REACHED, EXIT_OK
 from .inputs import add_repair, read_input
-from .outputs import refuse_existing
 from .reading import said_of
+from .told_files import told_files, written_with_report
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
@@ -24,6 +23,7 @@ REPORT = "reflection.json"
 PICTURES = ("views.png", "differences.png")
 TURNTABLE = "turntable.gif"
 _LEAST_SIZE = 16
+_LARGEST_FRAME = 256
 _DESCRIPTION = (
     "Renders a polygon mesh as a mirror, every face plane, among stripes, and compares the pictures with those of a "
     "smooth surface: the reference, or the same mesh smoothly shaded. The score is 1 - SSIM, averaged over views and "
@@ -51,8 +51,8 @@ def add_parser(subparsers: Any) -> None:
     add("--reference", metavar="FILE", help="smooth surface to compare with: a fine mesh, mirrored with its vertex "
         "normals (default: the input itself)")  # fmt: skip
     add("--json", action="store_true", help="print one JSON object instead of a table")
-    add("-o", "--output", metavar="FOLDER", help=f"folder for {REPORT}, pictures and a turntable; nothing is written "
-        "without it")  # fmt: skip
+    add("-o", "--output", metavar="FOLDER", help=f"folder for NAME.{REPORT}, pictures and a turntable; nothing is "
+        "written without it")  # fmt: skip
     add("--size", type=positive_count, default=256, metavar="PIXELS", help="pixels along a picture (default 256)")
     add("--frequency", type=positive_or_none, default=None, metavar="F", help="stripe pairs per unit of the mirrored "
         "direction (default: such that the smooth surface shows about four)")  # fmt: skip
@@ -84,6 +84,8 @@ def run(arguments: argparse.Namespace) -> int:
         if files:
             write(files, mesh, score, report, arguments)
     if arguments.json:
+        from ..io import to_json
+
         sys.stdout.write(to_json(report))
         return _ended(report)
     for line in [*said_of(mesh), *(said_of(reference, arguments.reference) if reference else [])]:
@@ -143,25 +145,24 @@ def write(
     report: dict[str, Any],
     arguments: argparse.Namespace,
 ) -> None:
-    """Writes report, pictures and turntable, each whole or not at all."""
-    from ..io import atomic_write_text
+    """Writes report and pictures, all or nothing, then the turntable, which takes long."""
+    pictures, films = files[1:3], files[3:]
+    with written_with_report(files, report, arguments, later=films):
+        if pictures:
+            from ..viewing.picture_reflections import picture_reflection_differences, picture_reflections
 
-    files[0].parent.mkdir(parents=True, exist_ok=True)
-    atomic_write_text(files[0], to_json(report), overwrite=arguments.force)
-    if len(files) == 1:
-        return
-    from ..progress import frame_progress
-    from ..viewing.picture_reflections import picture_reflection_differences, picture_reflections
-    from ..viewing.turntable import turntable
+            name = Path(arguments.input).name
+            picture_reflections(pictures[0], score, name, overwrite=arguments.force)
+            picture_reflection_differences(pictures[1], score, name, overwrite=arguments.force)
+    for film in films:
+        from ..progress import frame_progress
+        from ..viewing.turntable import turntable
 
-    name = Path(arguments.input).name
-    picture_reflections(files[1], score, name, overwrite=arguments.force)
-    picture_reflection_differences(files[2], score, name, overwrite=arguments.force)
-    if arguments.frames:
         with frame_progress(arguments.frames, "turntable") as progress:
             turntable(
-                files[3], mesh.vertices, mesh.topology, score.setup.reference,
-                frames=arguments.frames, progress=progress, overwrite=arguments.force,
+                film, mesh.vertices, mesh.topology, score.setup.reference,
+                frames=arguments.frames, size=min(arguments.size, _LARGEST_FRAME), progress=progress,
+                overwrite=arguments.force,
             )  # fmt: skip
 
 
@@ -179,9 +180,5 @@ def _score(mesh: PolygonMesh, reference: PolygonMesh | None, arguments: argparse
 
 def _files(arguments: argparse.Namespace) -> list[Path]:
     """The files to write, the report first; refuses those that exist."""
-    if arguments.output is None:
-        return []
     pictures = () if arguments.no_pictures else (*PICTURES, *((TURNTABLE,) if arguments.frames else ()))
-    files = [Path(arguments.output) / name for name in (REPORT, *pictures)]
-    refuse_existing(files, force=arguments.force)
-    return files
+    return told_files(arguments, (REPORT, *pictures))

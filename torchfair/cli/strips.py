@@ -22,7 +22,7 @@ def add_strips(parser: argparse.ArgumentParser) -> None:
     """The options of strips."""
     add = parser.add_argument
     add("--strips", type=non_negative, metavar="HEIGHT", help="write strips of this height orthogonal to the mesh "
-        "along the principal edges: strips.obj in space with uv, strips.svg flat")  # fmt: skip
+        "along the principal edges: NAME.strips.obj in space with uv, NAME.strips.svg flat")  # fmt: skip
     add("--depth", type=non_negative, default=0.0, metavar="DEPTH", help="how far strips reach to the other side "
         "(default 0)")  # fmt: skip
     add("--millimetres", type=non_negative, default=1.0, metavar="MM", help="length of one unit of INPUT in flat "
@@ -32,7 +32,7 @@ def add_strips(parser: argparse.ArgumentParser) -> None:
         "takes, one above the other in one drawing (default: one sheet, as high as it has to be)")  # fmt: skip
     add("--gap", type=non_negative, metavar="MM", help="distance between strips on a sheet and to its rim, such as the "
         "thickness of the material (default: a quarter of the width of the strips)")  # fmt: skip
-    add("--dxf", action="store_true", help="write strips.dxf too (needs the extra torchfair[dxf])")
+    add("--dxf", action="store_true", help="write NAME.strips.dxf too (needs the extra torchfair[dxf])")
 
 
 class StripFiles:
@@ -75,12 +75,12 @@ class StripFiles:
                     f"--{name.replace('_', '-')}: strips are {width:.6g} mm wide, with gaps {width + 2.0 * gap:.6g}"
                 )
 
-    def files(self, folder: Path) -> dict[Path, Writer]:
-        """Writers by path; none if no strips were asked for."""
+    def files(self) -> dict[str, Writer]:
+        """Writers by end of the name; none if no strips were asked for."""
         if self._height is None:
             return {}
-        files: dict[Path, Writer] = {folder / "strips.obj": self._solid, folder / "strips.svg": self._flat}
-        return files | ({folder / "strips.dxf": self._drawing} if self._dxf else {})
+        files: dict[str, Writer] = {"strips.obj": self._solid, "strips.svg": self._flat}
+        return files | ({"strips.dxf": self._drawing} if self._dxf else {})
 
     def make(self, vertices: Tensor, polylines: list[Tensor], normals: Tensor) -> dict[str, float]:
         """Makes the strips; how true they are, nothing if none were asked for."""

@@ -8,13 +8,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .arguments import non_negative, positive_count
-from .edge_marks import carried, file_of_marks, read_marks
+from .edge_marks import carried, end_of_marks, read_marks
 from .inputs import add_repair, read_input
-from .outputs import refuse_existing, refuse_unknown_format, save_result
+from .output_checks import make_folders, refuse_taken, refuse_unknown_format
+from .output_names import OutputNames
 from .reading import in_numbers_of, said_of
+from .result_files import save_result
 
 if TYPE_CHECKING:
-    pass
+    from torch import Tensor
+
+    from ..io import PolygonMesh
+    from ..subdivision import Refinement
+
+_BYTES = 200  # of a vertex and its faces as text, about
 
 NAME = "torchfair subdivide"
 _DESCRIPTION = (
@@ -52,46 +59,47 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Reads, refines, writes."""
     from ..boundary import boundary_corners
+    from ..io import written_together
     from ..polylines import polylines_along
     from ..subdivision import refine
 
-    output = Path(arguments.output)
+    names = OutputNames.of(arguments.output)
+    output, end = names.output, end_of_marks(names.output)
     refuse_unknown_format(output)
-    beside = file_of_marks(output)
-    refuse_existing([output], force=arguments.force)
+    refuse_taken([output], force=arguments.force)
     mesh = read_input(arguments.input, arguments)
     marks = read_marks(mesh, arguments)
-    if marks is not None and beside is not None:
-        refuse_existing([beside], force=arguments.force)
-    numbers = output.with_suffix(".vertices.json")
-    if mesh.vertex_map is not None:
-        refuse_existing([numbers], force=arguments.force)
+    labels = None if marks is None or end is None else names.beside(end)
+    numbers = None if mesh.vertex_map is None else names.beside(".vertices.json")
+    written = [path for path in (output, labels, numbers) if path is not None]
+    refuse_taken(written, force=arguments.force)
+    make_folders(written, _BYTES * mesh.topology.num_vertices * 4**arguments.levels)
     scheme: Any = arguments.scheme.replace("-", "_")
     corners = boundary_corners(mesh.vertices, mesh.topology, math.radians(arguments.corner_angle))
     with in_numbers_of(mesh):
         step = refine(mesh.topology, scheme, arguments.levels, boundary=arguments.boundary, corners=corners)
-    lines, notes = [], said_of(mesh)
-    written = [output]
-    output.parent.mkdir(parents=True, exist_ok=True)
-    fine = None
+    fine, notes = None, said_of(mesh)
     if marks is not None:
         fine, note = carried(arguments.lines, marks, step)
         notes.append(note)
-        lines = polylines_along(step.topology, fine) if beside is None else []
-    vertices = step.apply(mesh.vertices)
-    left_out = save_result(output, vertices, step.topology, mesh, force=arguments.force, polylines=lines,
-        marks=marks is not None)  # fmt: skip
+    lines = [] if fine is None or labels is not None else polylines_along(step.topology, fine)
+    with written_together():
+        left_out = save_result(output, step.apply(mesh.vertices), step.topology, mesh, force=arguments.force,
+            polylines=lines, marks=marks is not None)  # fmt: skip
+        _write_beside(labels, fine, numbers, mesh, step, force=arguments.force)
     notes += [f"note: {note}" for note in left_out]
-    if fine is not None and beside is not None:
-        from ..io import save_edge_labels
-
-        save_edge_labels(beside, step.topology, fine, overwrite=arguments.force)
-        written.append(beside)
-    if mesh.vertex_map is not None:
-        from ..io import atomic_write_text, to_json
-
-        atomic_write_text(numbers, to_json({"vertex_map": mesh.vertex_map}), overwrite=arguments.force)
-        written.append(numbers)
     counts = [f"{t.num_vertices} vertices, {t.num_faces} faces" for t in (mesh.topology, step.topology)]
     print("\n".join([*notes, f"{counts[0]} to {counts[1]}", *(f"wrote {path}" for path in written)]))
     return 0
+
+
+def _write_beside(
+    labels: Path | None, fine: Tensor | None, numbers: Path | None, mesh: PolygonMesh, step: Refinement, *, force: bool
+) -> None:
+    """Writes marks that the mesh does not hold, and where vertices of the file have gone."""
+    from ..io import atomic_write_text, save_edge_labels, to_json
+
+    if labels is not None and fine is not None:
+        save_edge_labels(labels, step.topology, fine, overwrite=force)
+    if numbers is not None:
+        atomic_write_text(numbers, to_json({"vertex_map": mesh.vertex_map}), overwrite=force)

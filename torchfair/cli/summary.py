@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from .._names import FROM_ZERO, Names
+
 if TYPE_CHECKING:
     from ..formfinding import JobResult
 
@@ -17,6 +19,8 @@ LABELS = {
     "area": "area",
     "largest_face_area": "largest face area",
     "longest_edge": "longest edge",
+    "shortest_edge": "shortest edge",
+    "smallest_edge_ratio": "shortest side of a polygon over its own at the start",
     "smallest_angle_degrees": "smallest angle, degrees",
     "smallest_area_ratio": "smallest face area over its own at the start",
     "largest_area_ratio": "largest face area over its own at the start",
@@ -98,9 +102,9 @@ def kept_lines(result: JobResult[Any]) -> list[str]:
     return [f"kept: {promise}" for promise in result.promises if promise.holds]
 
 
-def missed_lines(result: JobResult[Any], asked_levels: int) -> list[str]:
-    """What was asked for and is not there."""
-    lines = [str(promise) for promise in result.promises if not promise.holds]
+def missed_lines(result: JobResult[Any], asked_levels: int, names: Names = FROM_ZERO) -> list[str]:
+    """What was asked for and is not there, in the numbers of a file."""
+    lines = [promise.told(names) for promise in result.promises if not promise.holds]
     if len(result.levels) <= asked_levels:
         lines.append(f"{len(result.levels) - 1} of {asked_levels} refinements: NOT REACHED; {result.message}")
     return lines

@@ -8,12 +8,25 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from .arguments import count
-from .edge_marks import file_of_marks
-from .inputs import add_handles, add_levels, add_reference, add_repair, read_handles, read_input, read_reference
+from ..errors import TorchfairError
+from .chosen_vertices import NUMBERS, ChosenVertices
+from .edge_marks import end_of_marks
+from .inputs import (
+    add_fixed,
+    add_handles,
+    add_levels,
+    add_reference,
+    add_repair,
+    read_fixed,
+    read_handles,
+    read_input,
+    read_reference,
+)
 from .job_command import JobCommand
-from .outputs import Outputs, Request, Writer, not_held
+from .outputs import Outputs, Request, Writer
 from .pictures import draw_edges
+from .reading import in_numbers_of
+from .result_files import not_held
 from .strips import StripFiles, add_strips
 from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edges, slide_warnings, vertex_mask
 from .symmetric_quads import even_settings, read_quads
@@ -54,7 +67,7 @@ class SymmetricCommand(JobCommand):
 
     def settings(self) -> type[Any]:
         """See the base class."""
-        from ..formfinding import SymmetricSettings
+        from ..settings.symmetric_settings import SymmetricSettings
 
         return SymmetricSettings
 
@@ -74,10 +87,10 @@ class SymmetricCommand(JobCommand):
         )
         add_labels(parser)
         add_handles(parser)
-        add("--fix", nargs="+", type=count, default=[], metavar="VERTEX", help="vertices that keep their places")
+        add_fixed(parser)
         add_reference(parser, "mesh of a surface to stay close to")
-        add("--on", nargs="+", type=count, default=[], metavar="VERTEX", help="impose the conditions only on the "
-            "principal polylines through these vertices")  # fmt: skip
+        add("--on", action="append", default=[], metavar="VERTEX ...", help="impose the conditions only on the "
+            f"principal polylines through these vertices: {NUMBERS}, or 'near X Y Z'")  # fmt: skip
         add_levels(parser)
         add_strips(parser)
         add_repair(parser)
@@ -89,25 +102,30 @@ class SymmetricCommand(JobCommand):
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class; quads are cut into triangles."""
         mesh = read_input(arguments.input, arguments)
-        handles = read_handles(arguments, mesh)
+        chosen = ChosenVertices(mesh)
+        handles, fixed = read_handles(arguments, chosen), read_fixed(arguments, chosen)
+        on = [vertex for words in arguments.on for vertex in chosen.of("--on", words)]
         if mesh.topology.is_quadrangular:
-            edges, vertices, notes = read_quads(arguments, mesh)
+            with in_numbers_of(mesh):
+                edges, vertices, notes = read_quads(arguments, chosen)
             settings = even_settings(self.options().asked(arguments), settings)
             notes += not_held(Path(arguments.output), mesh, same=False, marks=True)
             names = replace(mesh.names, faces=None, face_lines=None)  # those of quads
             mesh = replace(mesh, vertices=vertices, topology=edges.topology, attributes=None, names=names)
         else:
-            edges, notes = read_principal_edges(arguments, mesh)
+            edges, notes = read_principal_edges(arguments, chosen)
         options = {
             "handles": handles,
-            "fixed": vertex_mask("--fix", arguments.fix, mesh),
+            "fixed": vertex_mask(fixed, mesh),
             "reference": read_reference(arguments),
-            "on": polyline_vertices(arguments.on, mesh, edges) if arguments.on else None,
+            "on": polyline_vertices(on, mesh, edges) if on else None,
             "levels": arguments.levels,
         }
         keeps_shape = not (settings.free or handles or options["reference"])
         warnings = slide_warnings(arguments.input, mesh, edges) if keeps_shape else []
-        return Request(mesh, options, (mesh.vertices, edges), notes, warnings, settings)
+        report = {"strips": None}
+        notes = [*chosen.notes, *notes]
+        return Request(mesh, options, (mesh.vertices, edges), notes, warnings, settings, report=report)
 
     def most_steps(self, settings: Any) -> int:
         """Those of a level."""
@@ -124,15 +142,20 @@ class SymmetricOutputs(Outputs):
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
         super().__init__(arguments, pictures)
         self._strips = StripFiles(arguments)
-        self.others = self._strips.files(self.folder)
-        beside = file_of_marks(self.mesh)
+        self.others = self._strips.files()
+        beside = end_of_marks(self.mesh)
         self.beside = {} if beside is None else {beside: _labels}
 
-    def write_mesh(self, request: Request, result: Any) -> None:
-        """Makes the strips too, so that the report can say how true they are."""
-        super().write_mesh(request, result)
-        level = result.levels[-1]
-        made = self._strips.make(level.vertices, level.principal.polylines(), level.normals)
+    def more(self, request: Request, result: Any) -> bool:
+        """Makes the strips, so that the report can say how true they are."""
+        if not self.others:
+            return False
+        level, made = result.levels[-1], {}
+        try:
+            made = self._strips.make(level.vertices, level.principal.polylines(), level.normals)
+        except TorchfairError as error:
+            self.others = {}
+            request.missed.append(f"strips: NOT REACHED; {error}")
         request.report["strips"] = made or None
         if made:
             request.notes.append(
@@ -140,6 +163,7 @@ class SymmetricOutputs(Outputs):
                 f"to {made['largest_isometry_error']:.2g}, on {made['sheets']} sheet{'s' * (made['sheets'] != 1)} of "
                 f"{made['sheet_width_millimetres']:.5g} x {made['sheet_height_millimetres']:.5g} mm"
             )
+        return True
 
     def polylines(self, result: Any) -> Sequence[Tensor]:
         """Principal edges, unless they stand in a file beside."""

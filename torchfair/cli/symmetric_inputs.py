@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from .._names import Names
 from ..errors import MeshError
-from .arguments import count
+from .chosen_vertices import NEAR, NUMBERS, ChosenVertices, parts_of
 from .edge_marks import marks_file
 from .errors import CommandError
-from .inputs import number_in_mesh
+from .reading import in_numbers_of
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -36,37 +38,42 @@ def add_labels(parser: argparse.ArgumentParser) -> None:
     labels = parser.add_mutually_exclusive_group()
     labels.add_argument("--labels", metavar="FILE", help="OBJ or JSON file that marks the principal edges (default: "
         "INPUT if it marks any, else those along principal directions)")  # fmt: skip
-    labels.add_argument("--seed", nargs=2, type=count, metavar=("V", "W"), help="an edge, by its vertices (counted "
-        "from 0), that is principal; the others follow straight on and in parallel")  # fmt: skip
+    labels.add_argument("--seed", metavar="V W", help=f"an edge that is principal, by its vertices ({NUMBERS}), or "
+        "'near X Y Z' for the edge there; the others follow straight on and in parallel")  # fmt: skip
     parser.add_argument(
         "--allow-exceptions", action="store_true", help="leave out vertices where principal edges do not fit together"
     )
 
 
-def read_principal_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[PrincipalEdges, list[str]]:
+def read_principal_edges(arguments: argparse.Namespace, chosen: ChosenVertices) -> tuple[PrincipalEdges, list[str]]:
     """Principal edges as asked for, and what was decided, in words."""
     from ..principal import misalignment_of
 
     try:
-        edges, origin = _chosen_edges(arguments, mesh)
+        with in_numbers_of(chosen.mesh):
+            edges, origin = _chosen_edges(arguments, chosen)
     except MeshError as error:
         words = str(error)
         for argument, option in _OPTIONS.items():
             words = words.replace(argument, option)
         raise CommandError(words) from None
-    return edges, [_alignment(origin, misalignment_of(mesh.vertices, edges)), *_exceptions(edges)]
+    return edges, [
+        _alignment(origin, misalignment_of(chosen.mesh.vertices, edges)),
+        *_exceptions(edges, chosen.mesh.names),
+    ]
 
 
-def _chosen_edges(arguments: argparse.Namespace, mesh: PolygonMesh) -> tuple[PrincipalEdges, str]:
+def _chosen_edges(arguments: argparse.Namespace, chosen: ChosenVertices) -> tuple[PrincipalEdges, str]:
     """Principal edges, and where they come from."""
     from ..io import load_edge_labels
     from ..principal import PrincipalEdges, principal_edges_from_directions, principal_edges_from_seed
 
-    topology, allow = mesh.topology, arguments.allow_exceptions
+    mesh, allow = chosen.mesh, arguments.allow_exceptions
+    topology = mesh.topology
     if arguments.seed is not None:
-        v, w = arguments.seed
-        edges = principal_edges_from_seed(topology, joined_edge(arguments.seed, mesh), allow_exceptions=allow)
-        return edges, f"principal edges are parallel to ({v}, {w})"
+        seed = seed_edge(arguments.seed, chosen)
+        edges = principal_edges_from_seed(topology, seed, allow_exceptions=allow)
+        return edges, f"principal edges are parallel to the edge {chosen.edge_name(seed)}"
     file = marks_file(arguments)
     if file is not None:
         edges = PrincipalEdges(topology, load_edge_labels(file, topology, vertex_map=mesh.vertex_map))
@@ -88,12 +95,12 @@ def _alignment(origin: str, misalignment: float) -> str:
     """Where principal edges come from, how well they follow the surface, and what to do if they do not."""
     from ..principal import LARGE_MISALIGNMENT
 
-    words = f"{origin}, {misalignment:.2f} radians off the nearer principal direction on average"
+    words = f"{origin}, {math.degrees(misalignment):.0f} degrees off the nearer principal direction on average"
     if misalignment <= LARGE_MISALIGNMENT:
         return words
     return (
-        f"{words}. WARNING: edges at random are 0.39 off; the surface will have to bend to fit such edges. Choose "
-        "another family by one of its edges, with --seed V W, or remesh by torchfair mesh --triangles N"
+        f"{words}. WARNING: edges at random are 22 degrees off; the surface will have to bend to fit such edges. "
+        "Choose another family by one of its edges, with --seed V W, or remesh by torchfair mesh --triangles N"
     )
 
 
@@ -109,23 +116,20 @@ def slide_warnings(name: str, mesh: PolygonMesh, edges: PrincipalEdges) -> list[
     if slide <= _MOST_SLIDE:
         return []
     return [
-        f"principal edges are {angle:.2f} radians off the nearer principal direction on average: to follow it, "
-        f"vertices would slide by about {slide:.1f} edges, and above {_MOST_SLIDE} most surfaces bend or get less "
-        f"smooth. Rather lay edges anew: torchfair mesh {name} --triangles {mesh.topology.num_faces} -o lattice.obj, "
+        f"principal edges are {math.degrees(angle):.0f} degrees off the nearer principal direction on average: to "
+        f"follow it, vertices would slide by about {slide:.1f} edges, and above {_MOST_SLIDE} most surfaces bend "
+        "or get less smooth. Rather lay edges anew: "
+        f"torchfair mesh {name} --triangles {mesh.topology.num_faces} -o lattice.obj, "
         "then torchfair symmetric lattice.obj; or let the surface bend by --free"
     ]
 
 
-def vertex_mask(option: str, chosen: Sequence[int], mesh: PolygonMesh) -> Tensor:
-    """(V,) bool of chosen vertices, which are counted as in the file of the mesh."""
+def vertex_mask(chosen: Sequence[int], mesh: PolygonMesh) -> Tensor:
+    """(V,) bool of chosen vertices of a mesh."""
     import torch
 
-    chosen = [number_in_mesh(vertex, mesh, option) for vertex in chosen]
     mask = torch.zeros(mesh.topology.num_vertices, dtype=torch.bool)
-    wrong = [vertex for vertex in chosen if vertex >= len(mask)]
-    if wrong:
-        raise CommandError(f"{option}: vertices are numbered 0 to {len(mask) - 1}, got {wrong[0]}")
-    mask[chosen] = True
+    mask[list(chosen)] = True
     return mask
 
 
@@ -133,33 +137,38 @@ def polyline_vertices(chosen: Sequence[int], mesh: PolygonMesh, edges: Principal
     """Vertices of the principal polylines through the chosen ones."""
     import torch
 
-    mask = vertex_mask("--on", chosen, mesh)
+    mask = vertex_mask(chosen, mesh)
     lines = [line for line in edges.polylines() if bool(mask[line].any())]
     if not lines:
-        raise CommandError(f"--on: no principal polyline passes through {', '.join(map(str, chosen))}")
+        raise CommandError(f"--on: no principal polyline passes through {', '.join(map(mesh.names.vertex, chosen))}")
     on_lines: Tensor = torch.unique(torch.cat(lines))
     return on_lines
 
 
-def joined_edge(ends: Sequence[int], mesh: PolygonMesh) -> int:
-    """Number of the edge between two vertices."""
+def seed_edge(words: str, chosen: ChosenVertices) -> int:
+    """Number of the edge that ``--seed`` names by its ends, or by a place near it."""
     import torch
 
     from .._graph import edge_numbers
 
-    vertex_mask("--seed", ends, mesh)  # refuses what is no vertex
-    pair = torch.tensor([[number_in_mesh(end, mesh, "--seed") for end in ends]])
-    number = int(edge_numbers(mesh.topology, pair)[0])
+    parts = list(parts_of("--seed", words, (NEAR,)))
+    if [kind for kind, _ in parts] == [NEAR]:
+        return chosen.edge_near("--seed", parts[0][1])
+    ends = chosen.of("--seed", words)
+    if len(ends) != 2:
+        raise CommandError(f"--seed: expected two vertices V W, or near X Y Z, got '{words}'")
+    number = int(edge_numbers(chosen.mesh.topology, torch.tensor([ends]))[0])
     if number < 0:
-        raise CommandError(f"--seed: vertices {ends[0]} and {ends[1]} are not joined by an edge")
+        v, w = map(chosen.mesh.names.vertex, ends)
+        raise CommandError(f"--seed: vertices {v} and {w} are not joined by an edge")
     return number
 
 
-def _exceptions(edges: PrincipalEdges) -> list[str]:
+def _exceptions(edges: PrincipalEdges, names: Names) -> list[str]:
     notes = []
     for what, vertices in (("singular", edges.singular), ("with principal edges that do not fit", edges.exceptions)):
         if vertices.numel():
-            some = ", ".join(map(str, vertices[:8].tolist()))
+            some = ", ".join(map(names.vertex, vertices[:8].tolist()))
             more = ", ..." if vertices.numel() > 8 else ""
             notes.append(f"no conditions at {vertices.numel()} vertices {what}: {some}{more}")
     return notes

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 from torch.linalg import cross, vector_norm
 
+from .._graph import edge_numbers
 from ..projection import ElementTerm, SmoothAbsolute
 from ..topology import Topology
 from .base import Constraint
@@ -43,7 +44,7 @@ def boundary_bending_terms(
     """
     corners = topology.triangles
     sides = torch.cat([corners, corners.roll(-1, 1), corners.roll(-2, 1)])
-    on_boundary = torch.isin(edge_keys(sides[:, :2], topology), edge_keys(topology.boundary_edges, topology))
+    on_boundary = edge_numbers(topology, sides[:, :2]) >= topology.num_interior_edges
     total = normals[sides[:, 0]] + normals[sides[:, 1]]
     size = vector_norm(total, dim=1)
     given = (normals != 0.0).any(1)
@@ -53,11 +54,6 @@ def boundary_bending_terms(
     data = (total[chosen] / size[chosen, None],)
     loss = SmoothAbsolute(smoothing)
     return [ElementTerm(NAME, boundary_bend, [(block, sides[chosen])], data=data, weight=weight, loss=loss)]
-
-
-def edge_keys(edges: Tensor, topology: Topology) -> Tensor:
-    """Numbers of undirected edges (n, 2), the same for both directions."""
-    return edges.amin(1) * topology.num_vertices + edges.amax(1)
 
 
 class BoundaryBending(Constraint):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._graph import edge_numbers
 from ..projection import ElementTerm
 from ..topology import Topology
 from .base import Constraint
-from .boundary_bending import edge_keys
 from .normal_variation import edge_stencils, pair_bend
 
 
@@ -28,10 +28,9 @@ def flat_edge_terms(topology: Topology, edges: Tensor, *, weight: float, block: 
         MeshError: an edge number is out of range.
     """
     topology.check_interior_edges(edges)
-    chosen = edge_keys(topology.interior_edges[edges], topology)
     terms = []
     for (left, _), stencil in edge_stencils(topology).items():
-        rows = stencil[torch.isin(edge_keys(stencil[:, :2], topology), chosen)]
+        rows = stencil[torch.isin(edge_numbers(topology, stencil[:, :2]), edges)]
         if rows.numel():
             residual, jacobian = pair_bend(left, stencil.shape[1])
             where = [(block, rows)]

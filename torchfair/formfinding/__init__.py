@@ -1,18 +1,19 @@
 """Formfinding jobs: short recipes over energies, constraints and guided projection (paper section 5)."""
 
+from ..settings.denoise_settings import DenoiseSettings as DenoiseSettings
+from ..settings.fair_settings import FairSettings as FairSettings
+from ..settings.form_settings import FormSettings as FormSettings
+from ..settings.symmetric_settings import SymmetricSettings as SymmetricSettings
 from .denoise.noise import noise_level as noise_level
 from .denoise.recipe import DenoiseRecipe as DenoiseRecipe
 from .denoise.recipe import denoise as denoise
-from .denoise.settings import DenoiseSettings as DenoiseSettings
 from .fair.planar_quads import PLANAR_QUADS as PLANAR_QUADS
 from .fair.planar_quads import planar_quads as planar_quads
 from .fair.recipe import FairRecipe as FairRecipe
 from .fair.recipe import minimise_normal_variation as minimise_normal_variation
-from .fair.settings import FairSettings as FairSettings
 from .form.prescribed_normals import prescribed_normals as prescribed_normals
 from .form.recipe import FormRecipe as FormRecipe
 from .form.recipe import minimise_absolute_curvature as minimise_absolute_curvature
-from .form.settings import FormSettings as FormSettings
 from .form.start_surface import start_surface as start_surface
 from .job import JobResult as JobResult
 from .job import Level as Level
@@ -31,5 +32,4 @@ from .symmetric.measures import symmetric_measures as symmetric_measures
 from .symmetric.recipe import SymmetricLevel as SymmetricLevel
 from .symmetric.recipe import SymmetricRecipe as SymmetricRecipe
 from .symmetric.recipe import principal_symmetric as principal_symmetric
-from .symmetric.settings import SymmetricSettings as SymmetricSettings
 from .symmetric.strip_normals import strip_normals as strip_normals

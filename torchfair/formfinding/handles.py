@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import torch
 from torch import Tensor
 
+from .._names import PlacedError, few
 from ..errors import MeshError, ShapeError
 from ..topology import Topology
 
@@ -66,8 +67,8 @@ def refuse_unreachable_handles(handles: Tensor, targets: Tensor, vertices: Tenso
     away = torch.linalg.vector_norm(places - targets, dim=1) > _SAME_PLACE * extent
     bad = handles[stays[handles] & away].tolist()
     if bad:
-        raise MeshError(
-            f"{len(bad)} handles cannot be reached, first {bad[:5]}: these vertices lie on the boundary, which stays "
-            "where it is. Lead the boundary curve through the targets, leave these handles out, or let the boundary "
-            "glide (its corners stay even so)"
-        )
+        raise PlacedError(
+            f"{len(bad)} handle(s) cannot be reached: vertices ", few("vertex", bad),
+            ". These lie on the boundary, which stays where it is. Lead the boundary curve through the targets, leave "
+            "these handles out, or let the boundary glide (its corners stay even so)"
+        )  # fmt: skip

@@ -3,11 +3,13 @@
 :func:`load_mesh` and :func:`save_mesh` choose the format by the extension: OBJ, OFF and PLY are read and
 written here and keep polygons, order and orientation; other formats go through trimesh, which is imported
 only then. Marked edges, such as principal ones, are line elements of an OBJ file or stand in a JSON file.
-Results and reports are JSON that every reader accepts.
+Results and reports are JSON that every reader accepts. Files appear whole or not at all, together where they belong
+together.
 """
 
 from .atomic import atomic_write_bytes as atomic_write_bytes
 from .atomic import atomic_write_text as atomic_write_text
+from .atomic import written_together as written_together
 from .curve_points import CurvePoints as CurvePoints
 from .curve_points import load_curve as load_curve
 from .curve_points import load_curves as load_curves

@@ -13,6 +13,7 @@ from ..errors import MeshFileError, TorchfairError
 from .obj import obj_words, read_vertices, statement_rows, vertex_numbers
 from .raw_mesh import Floats
 from .reading import read_bytes
+from .rhino import rhino_model, rhino_package
 
 _FINE = 1e-4  # of the extent of a drawing: chords of arcs and splines are as near to them
 _SAMPLES = 200  # of a curve in a 3DM file that is no polyline
@@ -62,21 +63,16 @@ def dxf_pieces(path: Path) -> list[Floats]:
 
 def rhino_pieces(path: Path) -> list[Floats]:
     """Curves of a 3DM file, as points (n, 3): the corners of polylines, others sampled from knot to knot."""
-    try:
-        import rhino3dm
-    except ImportError:
-        raise TorchfairError("3DM files need rhino3dm: pip install 'torchfair[rhino]'. Or save as DXF or OBJ") from None
+    rhino_package()
     read_bytes(path)
-    model = rhino3dm.File3dm.Read(str(path))
-    if model is None:
-        raise MeshFileError(path, "is no 3DM file that can be read")
-    found = [item.Geometry for item in model.Objects if isinstance(item.Geometry, rhino3dm.Curve)]
+    rhino, model = rhino_model(path)
+    found = [item.Geometry for item in model.Objects if isinstance(item.Geometry, rhino.Curve)]
     if not found:
         raise MeshFileError(path, "has no curves")
     pieces = []
     while found:
         curve = found.pop(0)
-        if isinstance(curve, rhino3dm.PolyCurve):
+        if isinstance(curve, rhino.PolyCurve):
             found = [*map(curve.SegmentCurve, range(curve.SegmentCount)), *found]
         else:
             pieces.append(np.array([(place.X, place.Y, place.Z) for place in _rhino_places(curve)]))

@@ -1,4 +1,4 @@
-"""The file ``report.json``: what was asked, what came out, and with what."""
+"""Reports: what was asked, what came out, and with what."""
 
 from __future__ import annotations
 

@@ -40,6 +40,20 @@ def rhino_package() -> Any:
     return rhino3dm
 
 
+def rhino_model(path: Path) -> tuple[Any, Any]:
+    """The package rhino3dm, and a 3DM file as it reads it.
+
+    Raises:
+        MeshFileError: the file cannot be read.
+        TorchfairError: rhino3dm is not installed.
+    """
+    rhino = rhino_package()
+    model = rhino.File3dm.Read(str(path))
+    if model is None:
+        raise MeshFileError(path, "is no 3DM file that can be read")
+    return rhino, model
+
+
 def read_rhino(path: Path, data: bytes) -> RawMesh:
     """All visible meshes of a 3DM file in one, blocks where they are inserted.
 
@@ -47,10 +61,7 @@ def read_rhino(path: Path, data: bytes) -> RawMesh:
         MeshFileError: it cannot be read, or has no mesh.
         TorchfairError: rhino3dm is not installed.
     """
-    rhino = rhino_package()
-    model = rhino.File3dm.Read(str(path))
-    if model is None:
-        raise MeshFileError(path, "is no 3DM file that can be read")
+    rhino, model = rhino_model(path)
     points: list[Floats] = []
     faces: list[list[int]] = []
     objects: list[tuple[str, str]] = []

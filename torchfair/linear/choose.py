@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import torch
 
+from .._solver_names import SOLVERS
 from ..errors import SettingsError
 from .base import LinearSolver, Pattern
 from .conjugate_gradients import ConjugateGradients
@@ -23,7 +24,6 @@ _MAKERS: dict[str, Callable[[], LinearSolver]] = {
     "rslab": RslabDirect,
     "cg": ConjugateGradients,
 }
-SOLVERS = ("auto", *_MAKERS)  # names that may be asked for
 
 
 def choose_solver(name: str, pattern: Pattern) -> LinearSolver:

@@ -149,13 +149,14 @@ class _Patch:
         return made
 
 
-def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis) -> list[str]:
+def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis, *, names: Names = FROM_ZERO) -> list[str]:
     """What the mesh as a whole needs, in sentences; none if no star is bad.
 
     Args:
         vertices: (V, 3) float64.
         topology: any polygons.
         diagnosis: of this mesh.
+        names: what vertices are called in words, such as ``names`` of a mesh that was read.
     """
     counts = diagnosis.counts()
     negative = counts["negative_angle_defects"]
@@ -173,11 +174,12 @@ def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis) ->
         aligned = principal_edges_from_directions(vertices, topology, allow_exceptions=True)
     except TorchfairError:  # stars without a normal, in a whole component
         return [f"{words}, and there are no principal directions to go by: remesh, or mend degenerate faces first"]
-    off = f"the best family of parallel edges is {aligned.misalignment:.2f} radians off the nearer principal direction"
+    degrees = math.degrees(aligned.misalignment)
+    off = f"the best family of parallel edges is {degrees:.0f} degrees off the nearer principal direction"
     remesh = f"torchfair mesh --triangles {topology.num_faces}"
     if aligned.misalignment > LARGE_MISALIGNMENT:
         return [f"{words}, and {off}: no choice of edges will do; remesh by {remesh}"]
-    v, w = topology.edges[int(aligned.edges.mask.nonzero()[0])].tolist()
+    v, w = map(names.vertex, topology.edges[int(aligned.edges.mask.nonzero()[0])].tolist())
     advice = [f"{words}, and {off}: torchfair symmetric --seed {v} {w} makes saddles of negatively curved stars"]
     if aligned.misalignment > _ALIGNED:
         advice.append(f"edges that far off have to turn, which bends the shape: {remesh} lays them right")

@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 from ..boundary import boundary_corners
 from ..errors import MeshError
 from ..fields.frames import Floats, Ints
+from ..settings.meshing_settings import MeshingSettings
 from .boundary_cells import Compact, compact, tidy_boundary
 from .boundary_runs import BoundaryRun, find_runs
 from .crease_runs import crease_lines
@@ -22,7 +23,6 @@ from .off_lines import off_the_lines
 from .relaxation import loosened, stretched
 from .seamless_map import MapProblem, SeamlessMap
 from .seams import Seams, find_seams
-from .settings import MeshingSettings
 from .surface import DesignSurface
 from .tracing import Cells, trace_cells
 from .untangling import untangled

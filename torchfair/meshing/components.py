@@ -16,6 +16,7 @@ from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
 from ..geometry import fitted_curvature
+from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
 from .attempt import PieceMesh
 from .curvature_sizes import CurvatureSizes
@@ -23,7 +24,6 @@ from .curved_surface import on_curved_surface
 from .ladder import NoMeshError, mesh_component
 from .lattice import Lattice
 from .mesh_creases import MeshCreases
-from .settings import MeshingSettings
 from .sizes import SizeField
 from .surface import DesignSurface, components_of
 from .verification import Shape, shape_of

@@ -12,12 +12,12 @@ import numpy as np
 
 from ..errors import MeshError
 from ..fields import Directions
+from ..settings.meshing_settings import MeshingSettings
 from .attempt import FailedAttemptError, PieceMesh, Plan, attempt
 from .combing import combed
 from .creases import Creases, find_creases
 from .cut_graph import CutGraph
 from .lattice import Lattice
-from .settings import MeshingSettings
 from .surface import DesignSurface
 
 _SMOOTHER = (1.0, 4.0, 16.0, 64.0)  # times the smoothing length

@@ -7,13 +7,13 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
 from .components import mesh_to_count, on_surface, read_surface, spacing_of
 from .curvature_sizes import CurvatureSizes, curvature_sizes
 from .lattice import SQUARES
 from .quad_mesh import QuadMesh
 from .report import measure
-from .settings import MeshingSettings
 from .verification import verified_topology
 
 

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from .._graph import edge_numbers
 from ..principal import PrincipalEdges
+from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
 from .components import Pieces, mesh_to_count, on_surface, read_surface, spacing_of
 from .curvature_sizes import CurvatureSizes, curvature_sizes
@@ -16,7 +17,6 @@ from .cut_cells import cut_cells
 from .lattice import triangle_lattice
 from .report import measure
 from .row_distances import row_distance, row_sizes, rows_across
-from .settings import MeshingSettings
 from .triangle_mesh import TriangleMesh
 from .verification import verified_topology
 

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from .._half_edges import first_few
+from .._names import PlacedError, few, few_groups
 from ..errors import MeshError, ShapeError
 from ..shapes.shape_mesh import Direction, ShapeMesh
 from ..topology import Topology
@@ -86,21 +86,22 @@ def _faces_of(rule: Differences, topology: Topology, seeds: Ints) -> tuple[Ints,
     faces, sides = corner_faces[is_seed], np.flatnonzero(is_seed) % 3
     crowded = faces[:-1][faces[:-1] == faces[1:]]
     if crowded.size:
-        raise MeshError(
-            f"seed_edge: several seeds lie in one triangle: faces {first_few(crowded.tolist(), crowded.size)}. "
-            "Only one edge of a triangle can be principal."
-        )
+        raise PlacedError(
+            "seed_edge: several seeds lie in one triangle: faces ", few("face", crowded),
+            ". Only one edge of a triangle can be principal."
+        )  # fmt: skip
     return faces, sides
 
 
 def _require_all(topology: Topology, sides: Ints) -> None:
     missing = np.flatnonzero(sides < 0)
     if missing.size:
-        vertex = topology.corners[3 * missing[0]].item()
-        raise MeshError(
-            f"seed_edge: {missing.size} face(s) are not connected with any seed, such as face {missing[0]} at vertex "
-            f"{vertex}. Give a seed edge for every component of the mesh."
-        )
+        vertex = int(topology.corners[3 * missing[0]])
+        raise PlacedError(
+            f"seed_edge: {missing.size} face(s) are not connected with any seed, such as face ",
+            ("face", int(missing[0])), " at vertex ", ("vertex", vertex),
+            ". Give a seed edge for every component of the mesh."
+        )  # fmt: skip
 
 
 def require_no_seams(topology: Topology, broken: Ints, num_seeds: int = 1) -> None:
@@ -112,14 +113,17 @@ def require_no_seams(topology: Topology, broken: Ints, num_seeds: int = 1) -> No
     culprits = np.flatnonzero(inside & (valences % 3 != 0))
     remedy = "Pass allow_exceptions=True to go without conditions along the seams"
     if culprits.size:
-        shown = [f"{vertex} (valence {valences[vertex]})" for vertex in culprits[:5].tolist()]
-        raise MeshError(
-            f"no family of edges is consistent around {culprits.size} singular vertex(es): vertices "
-            f"{first_few(shown, culprits.size)}. Singular vertices must have a valence divisible by {REGULAR // 2}. "
-            f"{remedy}, or remesh."
-        )
-    ends = [f"({v}, {w})" for v, w in topology.edges[torch.from_numpy(broken[:5])].tolist()]
+        shown = [(("vertex", v), f" (valence {valences[v]})") for v in culprits[:5].tolist()]
+        raise PlacedError(
+            f"no family of edges is consistent around {culprits.size} singular vertex(es): vertices ",
+            few_groups(shown, culprits.size),
+            f". Singular vertices must have a valence divisible by {REGULAR // 2}. {remedy}, or remesh."
+        )  # fmt: skip
+    pairs = topology.edges[torch.from_numpy(broken[:5])].tolist()
+    ends = [("(", ("vertex", v), ", ", ("vertex", w), ")") for v, w in pairs]
     reason = "the families change places around a handle or a hole"
     if num_seeds > 1:
         reason += ", or the seeds are not of one family"
-    raise MeshError(f"no consistent choice: {reason}. It breaks at edges {first_few(ends, broken.size)}. {remedy}.")
+    raise PlacedError(
+        f"no consistent choice: {reason}. It breaks at edges ", few_groups(ends, broken.size), f". {remedy}."
+    )  # fmt: skip

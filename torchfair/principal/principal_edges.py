@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from .._graph import edge_numbers
-from .._half_edges import first_few
+from .._names import PlacedError, few
 from ..errors import MeshError, ShapeError
 from ..polylines import join_triples
 from ..subdivision import Refinement
@@ -85,10 +85,10 @@ class PrincipalEdges:
         """
         if self.exceptions.numel():
             wrong = self.exceptions.tolist()
-            raise MeshError(
+            raise PlacedError(
                 f"{len(wrong)} regular vertex(es) do not have exactly two principal edges, opposite to each other: "
-                f"vertices {first_few(wrong, len(wrong))}. Mark other edges, or go without conditions there."
-            )
+                "vertices ", few("vertex", wrong), ". Mark other edges, or go without conditions there."
+            )  # fmt: skip
         return self
 
     def stars(self) -> PrincipalStars:

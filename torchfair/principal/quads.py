@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from .._graph import connected_in_two_colours, edge_numbers, face_components
-from .._half_edges import first_few
+from .._names import PlacedError, few
 from ..errors import MeshError
 from ..topology import Topology
 from .principal_edges import PrincipalEdges
@@ -86,8 +86,8 @@ def _require_quads(topology: Topology) -> Tensor:
     """
     wrong = torch.nonzero(topology.face_sizes != 4).squeeze(1).tolist()
     if wrong or not topology.num_faces:
-        shown = first_few(wrong, len(wrong))
-        raise MeshError(f"{len(wrong)} face(s) are not quads: faces {shown}. Remesh, or take a triangle mesh.")
+        words = f"{len(wrong)} face(s) are not quads: faces "
+        raise PlacedError(words, few("face", wrong), ". Remesh, or take a triangle mesh.")
     return topology.corners.view(-1, 4)
 
 
@@ -98,11 +98,12 @@ def _families(topology: Topology) -> Tensor:
     if broken.numel():
         odd = ~topology.is_boundary_vertex & (topology.valences % 2 == 1)
         culprits = torch.nonzero(odd).squeeze(1).tolist()
-        where = f"around vertices {first_few(culprits, len(culprits))}, whose valence is odd"
-        raise MeshError(
-            f"the edges are no two families {where if culprits else 'around a handle or a hole'}: principal edges "
-            "would have to turn there. Cut the mesh into parts without them, or move these vertices to the boundary."
-        )
+        where = ["around vertices ", *few("vertex", culprits), ", whose valence is odd"]
+        raise PlacedError(
+            "the edges are no two families ", where if culprits else "around a handle or a hole",
+            ": principal edges would have to turn there. Cut the mesh into parts without them, or move these vertices "
+            "to the boundary."
+        )  # fmt: skip
     return turned
 
 
@@ -120,10 +121,10 @@ def _leans(topology: Topology, principal: Tensor) -> Tensor:
     lean, broken = two_colours(topology.num_faces, topology.interior_edge_faces, change)
     if broken.numel():
         faces = broken.tolist()
-        raise MeshError(
-            f"rows of quads cannot be cut in turn, because an odd number of them closes up: faces "
-            f"{first_few(faces, len(faces))}. Take the other family of edges, or a mesh with another row."
-        )
+        raise PlacedError(
+            "rows of quads cannot be cut in turn, because an odd number of them closes up: faces ", few("face", faces),
+            ". Take the other family of edges, or a mesh with another row."
+        )  # fmt: skip
     return lean
 
 

@@ -1,5 +1,6 @@
 """Guided projection: write the residual of one element, let the library assemble and solve."""
 
+from ..settings.projection_settings import ProjectionSettings as ProjectionSettings
 from .guided_projection import GuidedProjection as GuidedProjection
 from .guided_projection import guided_projection as guided_projection
 from .loss import LogAbsolute as LogAbsolute
@@ -15,7 +16,6 @@ from .result import ProjectionResult as ProjectionResult
 from .result import Status as Status
 from .result import TermResidual as TermResidual
 from .run import Callback as Callback
-from .settings import ProjectionSettings as ProjectionSettings
 from .state import ProjectionState as ProjectionState
 from .steps import finished as finished
 from .steps import init as init

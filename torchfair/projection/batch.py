@@ -5,11 +5,11 @@ from __future__ import annotations
 from torch import Tensor
 
 from .._interrupts import Interrupts, deferred_interrupts
+from ..settings.projection_settings import ProjectionSettings
 from .evaluate import culprit, residual_tables
 from .layout import State
 from .problem import Problem
 from .result import IterationRecord, ProjectionResult, Status, TermResidual, message_of
-from .settings import ProjectionSettings
 from .state import ProjectionState
 from .steps import init, of_members, record_of, step
 from .stopwatch import Stopwatch

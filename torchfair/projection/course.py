@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from ..settings.projection_settings import ProjectionSettings
 from .damping import Damping
 from .result import Status
-from .settings import ProjectionSettings
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from torch import Tensor
 from .._shown import shown
 from .._threads import threads_for
 from ..errors import ShapeError
+from ..settings.projection_settings import ProjectionSettings
 from .batch import BatchRun
 from .differentiation import Way
 from .layout import State
 from .problem import Problem
 from .result import ProjectionResult
 from .run import Callback, Observe, Run
-from .settings import ProjectionSettings
 from .term import ElementTerm
 from .trials import Guard
 

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from .._interrupts import Interrupts, deferred_interrupts
+from ..settings.projection_settings import ProjectionSettings
 from .evaluate import culprit, residual_table
 from .layout import State
 from .problem import Problem
 from .result import IterationRecord, ProjectionResult, Status, message_of
-from .settings import ProjectionSettings
 from .state import ProjectionState
 from .steps import finished, init, record_of, step
 from .stopwatch import Stopwatch

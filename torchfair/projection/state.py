@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from torch import Tensor
 
 from ..linear import LinearSolver
+from ..settings.projection_settings import ProjectionSettings
 from .course import Course
 from .inequalities import Inequalities
 from .linear_system import LinearSystem
 from .proposal import Proposal
 from .result import Status
-from .settings import ProjectionSettings
 from .system import Evaluation
 
 

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from .._threads import threads_for
 from ..errors import SettingsError
+from ..settings.projection_settings import ProjectionSettings
 from .candidates import try_candidates
 from .certificate import certified
 from .course import Course, Outcome, Standing
@@ -23,7 +24,6 @@ from .inequalities import Inequalities
 from .layout import State
 from .problem import Problem
 from .result import IterationRecord, Status
-from .settings import ProjectionSettings
 from .state import Linearised, ProjectionState
 from .stopwatch import Stopwatch
 from .system import Evaluation

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import torch
 from torch import Tensor
 
@@ -28,7 +30,8 @@ def mean_colors(shade: Shader, triangles: Tensor, factor: int) -> Tensor:
         colors = shade(band.reshape(-1), places)
         if factor > 1:
             cells = colors.view(band.shape[0], factor, width // factor, factor, colors.shape[1])
-            colors = (cells.sum(1).sum(2) / factor**2).view(-1, colors.shape[1])
+            squares = (cells[:, i, :, j] for i in range(factor) for j in range(factor))
+            colors = (functools.reduce(torch.add, squares) / factor**2).view(-1, colors.shape[1])
         bands.append(colors)
     return torch.cat(bands)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._half_edges import edge_keys, groups_of
 from .._names import Ints, few, few_groups
-from .soup import Bools, Soup, edge_keys, groups_of
+from .soup import Bools, Soup
 
 
 def without_duplicates(soup: Soup) -> Soup:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from .._half_edges import edge_keys, groups_of
 from .._names import Ints, Part, PlacedError, Sentence, few, sentence
 
 Floats = npt.NDArray[np.float64]
@@ -74,6 +76,18 @@ class Soup:
         heads: Ints = self.corners[following]
         return heads
 
+    @cached_property
+    def rim(self) -> Ints:
+        """Corners from which edges of the boundary run, in order."""
+        order, starts, counts = groups_of(edge_keys(self.corners, self.heads, len(self.points)))
+        rim: Ints = np.sort(order[starts[counts == 1]])
+        return rim
+
+    @property
+    def rim_vertices(self) -> Ints:
+        """Ends of the edges of the boundary, in order."""
+        return np.unique(np.concatenate([self.corners[self.rim], self.heads[self.rim]]))
+
     @property
     def extent(self) -> float:
         """Largest side of the bounding boxes of what is used."""
@@ -110,16 +124,3 @@ class Soup:
     def renaming(self, names: Ints) -> Soup:
         """Vertices (V,) merged into others."""
         return replace(self, corners=names[self.corners], merged=names[self.merged])
-
-
-def edge_keys(tails: Ints, heads: Ints, count: int) -> Ints:
-    """One number for each edge, whichever way it is traversed."""
-    keys: Ints = np.minimum(tails, heads) * np.int64(max(count, 1)) + np.maximum(tails, heads)
-    return keys
-
-
-def groups_of(keys: Ints) -> tuple[Ints, Ints, Ints]:
-    """Equal keys as ``(order, starts, counts)``: group i is ``order[starts[i] : starts[i] + counts[i]]``."""
-    order = np.argsort(keys, kind="stable")
-    starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
-    return order, starts, np.diff(np.append(starts, keys.size))

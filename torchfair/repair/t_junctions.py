@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._names import Ints, few
-from .soup import Soup, edge_keys, groups_of
+from .._half_edges import edge_keys
+from .._names import few
+from .soup import Soup
 from .welding import rim_places
 
 _LEAST = 1e-9  # of an edge: nearer to its ends, a vertex is no T-junction
@@ -20,16 +21,14 @@ def with_t_junctions_joined(soup: Soup, tolerance: float, *, by_place: bool = Fa
     an edge of the boundary, too; with ``by_place``, an edge at the same place. Nothing is done where no face has any
     area.
     """
-    count = len(soup.points)
-    order, starts, counts = groups_of(edge_keys(soup.corners, soup.heads, count))
-    single = np.sort(order[starts[counts == 1]])
+    count, single = len(soup.points), soup.rim
     if not single.size or soup.without_area().all():
         return soup
     tails, heads = soup.corners, soup.heads
-    places = rim_places(soup, single, tolerance) if by_place else np.arange(count)
+    places = rim_places(soup, tolerance) if by_place else np.arange(count)
     known = set(edge_keys(places[tails[single]], places[heads[single]], count).tolist())
     inserted: dict[int, list[int]] = {}
-    for corner, found in _candidates(soup, single, tolerance):
+    for corner, found in _candidates(soup, tolerance):
         inside = list({int(places[vertex]): vertex for vertex in found}.values())
         chain = places[[tails[corner], *inside, heads[corner]]]
         if known & set(edge_keys(chain[:-1], chain[1:], count).tolist()):
@@ -56,11 +55,11 @@ def with_t_junctions_joined(soup: Soup, tolerance: float, *, by_place: bool = Fa
     )
 
 
-def _candidates(soup: Soup, single: Ints, tolerance: float) -> list[tuple[int, list[int]]]:
+def _candidates(soup: Soup, tolerance: float) -> list[tuple[int, list[int]]]:
     """Corners from which edges of the boundary run, with the vertices of the boundary inside of them, in order."""
     from scipy.spatial import cKDTree
 
-    rim = np.unique(np.concatenate([soup.corners[single], soup.heads[single]]))
+    single, rim = soup.rim, soup.rim_vertices
     places = soup.points[rim].reshape(len(rim), -1)
     tree = cKDTree(places)
     tails = soup.points[soup.corners[single]].reshape(len(single), -1)

@@ -11,7 +11,7 @@ from .._names import Ints, few_groups
 from ..errors import SettingsError
 from .corners import without_repeated_corners
 from .pairing import joined_ends, paired_corners
-from .soup import Floats, Soup, edge_keys, groups_of
+from .soup import Floats, Soup
 
 _OF_EXTENT = 1e-6  # default tolerance: six digits of a text file
 _SINGLE = 2.0**-21  # of the largest coordinate: four units in the last place of single precision
@@ -80,24 +80,20 @@ class Seams(NamedTuple):
 
 def find_seams(soup: Soup, tolerance: float, *, split_edges: bool = False) -> Seams:
     """Where edges of the boundary coincide within ``tolerance``."""
-    count = len(soup.points)
-    order, starts, counts = groups_of(edge_keys(soup.corners, soup.heads, count))
-    single = np.sort(order[starts[counts == 1]])
-    places = rim_places(soup, single, tolerance)
+    single, places = soup.rim, rim_places(soup, tolerance)
     short = single[places[soup.corners[single]] == places[soup.heads[single]]]
     long = np.setdiff1d(single, short, assume_unique=True)
     pairs = paired_corners(soup, places, long, split=split_edges)
     glued = soup.corners[joined_ends(soup, pairs, places)]
     collapsed = np.stack([soup.corners[short], soup.heads[short]], 1)
-    labels = connected(np.concatenate([glued, collapsed]), count)
+    labels = connected(np.concatenate([glued, collapsed]), len(soup.points))
     _, first = np.unique(labels, return_index=True)
     return Seams(first[labels], pairs)
 
 
-def rim_places(soup: Soup, single: Ints, tolerance: float) -> Ints:
-    """(V,) the first vertex at the same place as each, among the ends of the edges from the corners ``single``."""
-    rim = np.unique(np.concatenate([soup.corners[single], soup.heads[single]]))
-    places = np.arange(len(soup.points))
+def rim_places(soup: Soup, tolerance: float) -> Ints:
+    """(V,) the first vertex at the same place as each, among those of the boundary."""
+    rim, places = soup.rim_vertices, np.arange(len(soup.points))
     if rim.size:
         places[rim] = rim[_places(soup.points[rim].reshape(rim.size, -1), tolerance)]
     return places

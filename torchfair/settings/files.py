@@ -7,7 +7,7 @@ import difflib
 import json
 import math
 import os
-import sys
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -38,7 +38,7 @@ def read_settings(path: str | os.PathLike[str], kind: type[S], *, job: str | Non
 
     Example::
 
-        settings = read_settings("smooth/report.json", FairSettings)
+        settings = read_settings("smooth/roof.report.json", FairSettings)
     """
     return _made(read_fields(path, kind, job=job), kind, os.fspath(path))
 
@@ -122,20 +122,12 @@ def _plain(value: Any) -> Any:
 def _document(path: Path) -> dict[str, Any]:
     text = path.read_text(encoding="utf-8")
     try:
-        document = _toml(text, path) if path.suffix.lower() == ".toml" else json.loads(text)
+        document = tomllib.loads(text) if path.suffix.lower() == ".toml" else json.loads(text)
     except ValueError as error:  # of both parsers
         raise SettingsError(f"{path}: neither TOML nor JSON as its name promises: {error}") from None
     if not isinstance(document, dict):
         raise SettingsError(f"{path}: expected fields with their values, got {type(document).__name__}")
     return document
-
-
-def _toml(text: str, path: Path) -> dict[str, Any]:
-    if sys.version_info < (3, 11):
-        raise SettingsError(f"{path}: TOML is read from Python 3.11 on; write the same fields as JSON")
-    import tomllib
-
-    return tomllib.loads(text)
 
 
 def _flat(values: Mapping[str, Any], fields: Mapping[str, SettingField], where: str) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from .._names import FROM_ZERO, Names
 from .._one_mesh import one_mesh
 from ..errors import ShapeError
 from ..stars import StarClasses, StarKind, normal_pyramid
@@ -23,6 +24,7 @@ def picture_pyramids(
     chosen: Sequence[int],
     title: str = "",
     *,
+    names: Names = FROM_ZERO,
     columns: int = 3,
     width: int = 1600,
     overwrite: bool = False,
@@ -39,6 +41,7 @@ def picture_pyramids(
         crossings: (V,) see :func:`torchfair.stars.pyramid_self_intersections`.
         chosen: vertex numbers; a picture without any says so.
         title: words on top; none by default.
+        names: what vertices are called in captions, such as ``names`` of a mesh that was read.
         columns: pyramids in a row.
         width: columns of pixels of the file; the number of rows follows.
         overwrite: whether an existing file may be replaced.
@@ -69,7 +72,7 @@ def picture_pyramids(
         if kind == "saddle":
             kind = "good saddle" if bool(classes.good[vertex]) else "bad saddle"
         pattern = ",".join(map(str, classes.pattern(vertex, ordinary=True)))
-        sheet.caption(f"vertex {vertex}: {kind}", left, top, panel)
+        sheet.caption(f"vertex {names.vertex(vertex)}: {kind}", left, top, panel)
         words = f"edges {pattern}" + (f", {int(crossings[vertex])} crossings" if crossings[vertex] else "")
         sheet.text(words, left + panel / 2, top + 1.35 * CAPTION, 21, "#5b6472", ha="center", va="center")
     return sheet.write(path, overwrite=overwrite)

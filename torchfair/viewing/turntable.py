@@ -12,14 +12,15 @@ from torch import Tensor
 from ..cameras import OrthographicCamera
 from ..io.atomic import atomic_write_bytes
 from ..reflection import Stripes, render_reflection, ring_directions
-from ..reflection.smooth_reference import SmoothReference
+from ..reflection.smooth_reference import SmoothReference, one_finite_mesh
 from ..topology import Topology
-from .picture_reflections import mirror_colors
+from .shading import STRIPES_DARK
 from .view_direction import view_direction
 
 _ELEVATION = 38.0
 _MILLISECONDS = 80
 _BANDS = 8
+_COLORS = 32
 
 
 def turntable(
@@ -55,6 +56,7 @@ def turntable(
     from PIL import Image
 
     smooth = reference or SmoothReference.of_mesh(vertices, topology)
+    vertices, smooth = _normalised(one_finite_mesh(vertices, topology), topology, smooth)
     up = view_direction(vertices, topology).up
     directions = ring_directions(up, _ELEVATION, frames)
     stripes = Stripes(up, _BANDS / 2)
@@ -71,9 +73,10 @@ def turntable(
                 normals=smooth.normals,
             ),
         ]  # fmt: skip
-        colors = torch.cat([mirror_colors(p.image[0, 0], p.coverage[0]).to(torch.float32) for p in pair], dim=1)
-        pixels = (colors.clamp(0, 1) * 255).round().to("cpu", torch.uint8).numpy()
-        pictures.append(Image.fromarray(pixels).quantize(32, dither=Image.Dither.NONE))
+        brightness = torch.cat([p.image[0, 0] + 1 - p.coverage[0] for p in pair], dim=1)
+        steps = (brightness.clamp(0, 1) * (_COLORS - 1)).round().to("cpu", torch.uint8).numpy()
+        pictures.append(Image.fromarray(steps))
+        pictures[-1].putpalette(_palette())
         if progress is not None:
             progress(frame + 1)
     data = io.BytesIO()
@@ -81,3 +84,23 @@ def turntable(
         data, "gif", save_all=True, append_images=pictures[1:], duration=_MILLISECONDS, loop=0, optimize=False
     )
     atomic_write_bytes(path, data.getvalue(), overwrite=overwrite)
+
+
+def _normalised(vertices: Tensor, topology: Topology, smooth: SmoothReference) -> tuple[Tensor, SmoothReference]:
+    """Both of extent 1 about the origin, in float32: enough for pixels, and half the memory that is moved."""
+    used = torch.cat([vertices[topology.corners], smooth.vertices.to(vertices)])
+    if not used.shape[0]:
+        return vertices.to(torch.float32), smooth
+    low, high = used.amin(0), used.amax(0)
+    middle, extent = (low + high) / 2, (high - low).amax()
+    scale = torch.where(extent > 0, extent, 1.0)
+    moved, beside = (((v - middle.to(v)) / scale.to(v)).to(torch.float32) for v in (vertices, smooth.vertices))
+    return moved, SmoothReference(beside, smooth.topology, smooth.normals.to(torch.float32))
+
+
+def _palette() -> list[int]:
+    """Colours from dark stripes to paper, of which light ones are hardly different; red, green, blue, red, ..."""
+    dark, paper = torch.tensor(STRIPES_DARK), torch.ones(3)
+    colors = torch.lerp(dark, paper, torch.linspace(0, 1, _COLORS)[:, None])
+    numbers: list[int] = (colors * 255).round().to(torch.int64).flatten().tolist()
+    return numbers

@@ -10,12 +10,12 @@ from ...constraints import handle_terms, normal_variation_terms
 from ...energies import normal_variation
 from ...projection import Callback, ElementTerm
 from ...projection.layout import State
+from ...settings.denoise_settings import DenoiseSettings
 from ...topology import Topology
 from ..job import JobResult, Level, OneStage, Promise, Recipe, Stage, solved
 from .measures import denoise_measures, denoise_promises
 from .neighbourhoods import Neighbourhoods
 from .noise import noise_level
-from .settings import DenoiseSettings
 from .unfolding import Sides
 
 

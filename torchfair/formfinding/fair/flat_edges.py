@@ -11,8 +11,8 @@ from ..._graph import connected, face_components
 from ...constraints.normal_variation import edge_stencils
 from ...geometry import corner_angles, dihedral_angles
 from ...geometry._ops import angle_of, cross, dot, norm
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
-from .settings import FairSettings
 
 _ROUNDING = 1e-6  # radians: where every edge is flat, angles are those of rounding
 _BY_CHANCE = 3.0  # times the tolerance: share of the edges of a smooth mesh that are flat by chance, at most

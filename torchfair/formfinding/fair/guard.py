@@ -12,6 +12,7 @@ from ...geometry import corner_angles, face_area_vectors
 from ...geometry._ops import dot, norm
 from ...projection.layout import State
 from ...topology import Topology
+from .short_sides import ShortSides
 
 
 class FairGuard:
@@ -23,6 +24,8 @@ class FairGuard:
         placed: The vertices (V, 3) of the mesh of a state.
         smallest_angle: No corner angle may be smaller, radians.
         smallest_area: No face may be smaller than this fraction of its area at the start.
+        sides: Of polygons with more than three corners.
+        smallest_edge: None of them may be shorter than this fraction of their lengths.
         largest_areas: (F,) no face may be larger; None for no bound.
         from_last: Faces may not turn over against the last state, rather than against the start.
         may_turn: With ``from_last``, whether a face may turn over against the start, step by step.
@@ -36,6 +39,8 @@ class FairGuard:
         *,
         smallest_angle: float,
         smallest_area: float,
+        sides: ShortSides,
+        smallest_edge: float,
         largest_areas: Tensor | None,
         from_last: bool,
         may_turn: bool,
@@ -43,6 +48,7 @@ class FairGuard:
         self.topology, self.placed = topology, placed
         self._smallest_angle, self._from_last = smallest_angle, from_last
         self._largest_areas, self._may_turn = largest_areas, may_turn
+        self._sides, self._smallest_edge = sides, smallest_edge
         self._start = _Mesh(vertices, topology)
         self._smallest_areas = smallest_area * norm(self._start.area_vectors)
         self._known: list[tuple[Tensor, _Mesh]] = []
@@ -60,13 +66,15 @@ class FairGuard:
         return bool(kept.all())
 
     def keeps_bounds(self, trial: State) -> bool:
-        """Whether no corner angle and no face area falls below its bound where gliding vertices are put in place."""
+        """Whether no corner angle, side or area falls below its bound where gliding vertices are put in place."""
         after = self._mesh(trial)
         if after.vertices is trial["vertices"]:
             return True  # barriers see the same mesh
         if not bool((norm(after.area_vectors) >= self._smallest_areas).all()):
             return False
         if self._largest_areas is not None and not bool((norm(after.area_vectors) <= self._largest_areas).all()):
+            return False
+        if not bool((self._sides.shares(after.vertices, self.topology) >= self._smallest_edge).all()):
             return False
         return bool((corner_angles(after.vertices, self.topology) >= self._smallest_angle).all())
 

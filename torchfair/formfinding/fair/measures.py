@@ -9,6 +9,7 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from ..._names import few_groups, sentence
 from ...energies import angle_variation, normal_variation, total_absolute_curvature, total_mean_curvature
 from ...geometry import corner_angles, edge_lengths, face_areas, face_normals
 from ...geometry.closest_point import ReferenceSurface
@@ -30,16 +31,18 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
     """Energies and promised quantities of one mesh (V, 3), against its start (V, 3), both in the unit of the input.
 
     Returns:
-        ``normal_variation`` (E), ``angle_variation``, ``total_mean_curvature`` and ``total_absolute_curvature`` (C, the
-        floor of E, measured with the normal cycle), in the length unit of the input; ``energy_over_curvature``;
-        ``area``; ``largest_face_area``; ``mean_edge_length``; ``longest_edge``. ``largest_distance`` of vertices from
-        the reference surface and ``largest_distance_relative`` (in mean edges of the input), for vertices that glide on
-        a boundary curve from the nearer of both; ``largest_distance_back`` from vertices of the reference surface to
-        this one, and ``largest_distance_back_relative``; ``largest_boundary_distance`` of gliding vertices from their
-        curve. ``smallest_angle_degrees``; ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces`` against
-        the start, ``largest_growth`` against the larger of a face's own area and half the mean. ``largest_planarity``
-        of the faces kept planar and ``largest_planarity_of_all`` polygons (diagonal distance over mean edge of the
-        face), ``largest_planarity_growth`` of those that are nearly planar. ``largest_fold_degrees`` of the edges kept
+        ``normal_variation`` (E), ``angle_variation``, ``total_mean_curvature`` and ``total_absolute_curvature``
+        (C, the floor of E, measured with the normal cycle), in the length unit of the input;
+        ``energy_over_curvature``; ``area``; ``largest_face_area``; ``mean_edge_length``; ``shortest_edge``,
+        ``longest_edge``. ``largest_distance`` of vertices from the reference surface and
+        ``largest_distance_relative`` (in mean edges of the input), for vertices that glide on a boundary curve
+        from the nearer of both; ``largest_distance_back`` from vertices of the reference surface to this one,
+        and ``largest_distance_back_relative``; ``largest_boundary_distance`` of gliding vertices from their
+        curve. ``smallest_angle_degrees``; ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces``
+        against the start, ``smallest_edge_ratio`` of the sides of polygons, ``largest_growth`` against the
+        larger of a face's own area and half the mean. ``largest_planarity`` of the faces kept planar and
+        ``largest_planarity_of_all`` polygons (diagonal distance over mean edge of the face),
+        ``largest_planarity_growth`` of those that are nearly planar. ``largest_fold_degrees`` of the edges kept
         flat. ``largest_handle_distance``.
     """
     topology = problem.topology
@@ -50,7 +53,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
     ratios, growth = areas / face_areas(start, topology), areas / own_sizes(start, topology)
     turned = (face_normals(vertices, topology) * face_normals(start, topology)).sum(1)
     strayed = vertices.new_zeros(0) if problem.boundary is None else problem.boundary.distances(normalised)
-    warps = planarity(vertices, topology)
+    warps, sides = planarity(vertices, topology), problem.bounds.sides.shares(normalised, topology)
     energy, curvature = (
         float(quantity(vertices, topology)) for quantity in (normal_variation, total_absolute_curvature)
     )
@@ -73,6 +76,8 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "smallest_area_ratio": float(ratios.min()),
         "largest_area_ratio": float(ratios.max()),
         "largest_growth": float(growth.max()),
+        "smallest_edge_ratio": float(sides.min()) if sides.numel() else 1.0,
+        "shortest_edge": float(lengths.min()),
         "flipped_faces": int((turned <= 0.0).sum()),
         "largest_planarity": _largest(warps[problem.panels.planar]),
         "largest_planarity_of_all": _largest(warps[topology.face_sizes > 3]),
@@ -111,7 +116,10 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         promises.append(Promise("smallest angle", least, reached, "at least", "degrees", of_settings=asked))
         area = after["smallest_area_ratio"]
         promises.append(Promise("smallest area against its own", settings.smallest_area, area, "at least"))
-    if problem.largest_areas is not None:
+        if problem.bounds.sides.edges.numel():
+            edge, name = after["smallest_edge_ratio"], "shortest side of a polygon against its own"
+            promises.append(Promise(name, settings.smallest_edge, edge, "at least"))
+    if problem.bounds.largest_areas(problem.settings) is not None:
         growth, remedy = after["largest_growth"], "raise largest_area, or allow smaller areas"
         promises.append(Promise("growth of a face, by", settings.largest_area, growth, remedy=remedy))
     if not settings.faces_may_turn:
@@ -140,9 +148,10 @@ def located(promises: Sequence[Promise], vertices: Tensor, problem: FairProblem)
     warps = problem.panels.warps(vertices)
     order = torch.argsort(warps, descending=True, stable=True)[: int((warps > PLANAR_PROMISE).sum())]
     named = [
-        f"{face} ({warp:.2g})" for face, warp in zip(problem.panels.planar[order[:5]], warps[order[:5]], strict=True)
+        (("face", face), f" ({warp:.2g})")
+        for face, warp in zip(problem.panels.planar[order[:5]].tolist(), warps[order[:5]].tolist(), strict=True)
     ]
-    where = f"{len(order)} of {len(warps)}, counted from 0: {', '.join(named)}" + ", ..." * (len(order) > 5)
+    where = sentence(f"{len(order)} of {len(warps)}: faces ", few_groups(named, len(order)))
     return [replace(p, where=where) if p.name == _OF_PANELS and len(order) else p for p in promises]
 
 

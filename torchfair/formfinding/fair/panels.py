@@ -11,10 +11,10 @@ from ... import constraints as c
 from ...geometry import dihedral_angles
 from ...geometry.planarity import planarity
 from ...projection import ElementTerm
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from .flat_edges import edges_to_keep_flat
 from .planar_faces import NearlyPlanar, faces_to_keep_planar
-from .settings import FairSettings
 
 PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
 _PLANAR_ENOUGH = 5e-5
@@ -33,13 +33,14 @@ class Panels:
         notes: Decisions taken are added, in words.
 
     Attributes:
+        settings: Their weights; others may be set.
         planar: (n,) faces that are kept planar, or become so.
         nearly: Faces that do not become less planar.
         flat: (n,) interior edges that are kept flat.
     """
 
     def __init__(self, vertices: Tensor, topology: Topology, settings: FairSettings, notes: list[str]) -> None:
-        self._topology, self._settings, self._notes = topology, settings, notes
+        self.settings, self._topology, self._notes = settings, topology, notes
         self.planar = self._planar(vertices)
         self.nearly = self._nearly(vertices)
         self.flat = self._flat(vertices)
@@ -47,7 +48,7 @@ class Panels:
     # ---- decisions -------------------------------------------------------------------------------------
 
     def _planar(self, vertices: Tensor) -> Tensor:
-        settings, topology = self._settings, self._topology
+        settings, topology = self.settings, self._topology
         faces = faces_to_keep_planar(vertices, topology, settings)
         if faces.numel() and isinstance(settings.planar, str):
             words = "are kept planar" if settings.planar == "keep" else "are to be planar"
@@ -55,7 +56,7 @@ class Panels:
         return faces
 
     def _nearly(self, vertices: Tensor) -> NearlyPlanar:
-        settings = self._settings
+        settings = self.settings
         found = NearlyPlanar.of(vertices, self._topology, settings, self.planar)
         if not found.faces.numel() or not settings.planarity_weight:
             return found.none()
@@ -68,15 +69,15 @@ class Panels:
         return found if keeps else found.none()
 
     def _flat(self, vertices: Tensor) -> Tensor:
-        edges = edges_to_keep_flat(vertices, self._topology, self._settings)
-        if edges.numel() and isinstance(self._settings.flat, str):
+        edges = edges_to_keep_flat(vertices, self._topology, self.settings)
+        if edges.numel() and isinstance(self.settings.flat, str):
             self._notes.append(f"{edges.numel()} edges between coplanar triangles are kept flat")
         return edges
 
     @property
     def makes_planar(self) -> bool:
         """Whether faces are asked to be planar that need not be so at the start."""
-        settings = self._settings
+        settings = self.settings
         return settings.planar not in ("keep", "none") and bool(settings.planarity_weight and self.planar.numel())
 
     # ---- which vertices --------------------------------------------------------------------------------
@@ -93,7 +94,7 @@ class Panels:
         """(V,) bool, corners of the faces that are to be planar, but are not in a mesh (V, 3)."""
         topology = self._topology
         warped = torch.zeros(topology.num_faces, dtype=torch.bool)
-        warped[self.planar[self.warps(vertices) > self._settings.planar_tolerance]] = True
+        warped[self.planar[self.warps(vertices) > self.settings.planar_tolerance]] = True
         found = torch.zeros(topology.num_vertices, dtype=torch.bool)
         return found.index_fill(0, topology.corners[warped[topology.corner_faces]], True)
 
@@ -111,7 +112,7 @@ class Panels:
 
     def are_planar(self, vertices: Tensor) -> bool:
         """Whether a mesh (V, 3) is well within the tolerances that the job promises."""
-        settings, warps = self._settings, planarity(vertices, self._topology)
+        settings, warps = self.settings, planarity(vertices, self._topology)
         if settings.planarity_weight and bool((warps[self.planar] > _PLANAR_ENOUGH).any()):
             return False
         if bool((self.nearly.growth(warps) > _PLANAR_ENOUGH).any()):
@@ -127,16 +128,16 @@ class Panels:
 
     def planar_terms(self, share: float) -> list[ElementTerm]:
         """Of faces that are to be planar; ``share`` raises weights by powers of ten, all of them at 1."""
-        return c.planarity_terms(self._topology, self.planar, weight=_raised(self._settings.planarity_weight, share))
+        return c.planarity_terms(self._topology, self.planar, weight=_raised(self.settings.planarity_weight, share))
 
     def nearly_planar_terms(self, share: float) -> list[ElementTerm]:
         """Of faces that do not become less planar."""
-        return self.nearly.terms(self._topology, weight=_raised(self._settings.planarity_weight, share))
+        return self.nearly.terms(self._topology, weight=_raised(self.settings.planarity_weight, share))
 
     def flat_terms(self, share: float) -> list[ElementTerm]:
         """Of edges kept flat, by ``l* = 0`` where dual lengths are unknowns, as in the paper."""
-        weight = _raised(self._settings.flat_weight, share)
-        if self._settings.formulation == "lifted":
+        weight = _raised(self.settings.flat_weight, share)
+        if self.settings.formulation == "lifted":
             return c.lifted_flat_edge_terms(self._topology, self.flat, weight=weight)
         return c.flat_edge_terms(self._topology, self.flat, weight=weight)
 

@@ -11,8 +11,8 @@ from ...constraints.planarity import diagonal_distance
 from ...errors import MeshError
 from ...geometry.planarity import planarity
 from ...projection import ElementTerm
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
-from .settings import FairSettings
 
 
 def faces_to_keep_planar(vertices: Tensor, topology: Topology, settings: FairSettings) -> Tensor:

@@ -8,10 +8,10 @@ from torch import Tensor
 
 from ...meshing import QuadMesh, measure_mesh_on
 from ...projection import Callback
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level
 from .recipe import minimise_normal_variation
-from .settings import FairSettings
 
 PLANAR_QUADS = FairSettings(planar="quads", distance_limit=0.03, directions="keep")
 """Planar polygons at most 3 % of a mean edge from the surface, with edges that keep their directions."""

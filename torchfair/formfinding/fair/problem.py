@@ -11,24 +11,21 @@ import torch
 from torch import Tensor
 
 from ... import constraints as c
-from ...geometry import corner_angles, face_areas
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job.plan import Stage
 from ..job.pulls import Pulls
 from ..references import GivenReference
+from .face_bounds import FaceBounds
 from .feature_curves import FeatureCurves
 from .free_boundary import FreeBoundary
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
-from .panel_sizes import growth_terms, own_sizes
 from .panels import Panels
-from .settings import FairSettings
 
-_SAFE_ANGLE = math.radians(25.0)
-_LEAST_SAFETY = math.radians(2.0)
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8
 _NEAR = 1.0  # weight of closeness while faces become planar
@@ -50,6 +47,7 @@ class FairProblem:
 
     Attributes:
         near: Closeness to the reference surface.
+        bounds: On corner angles and areas of faces.
         input_edge: Mean edge length of the input.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
         panels: Faces that are kept planar and edges that are kept flat.
@@ -79,6 +77,7 @@ class FairProblem:
         self.input_edge, self._curves = input_edge, rim or feature_curves(vertices, topology, settings)
         self.corners = self._curves.rim.corners
         self._tell_of_creases()
+        self.bounds = FaceBounds(vertices, topology, pulls)
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
         self.boundary = self._gliding_boundary()
@@ -94,6 +93,11 @@ class FairProblem:
             input_edge=input_edge,
             notes=self.notes,
         )
+
+    def take_settings(self, settings: FairSettings) -> None:
+        """Takes other weights."""
+        self.settings = self.panels.settings = settings
+        self.__dict__.pop("guard", None)
 
     def reconsider(self) -> None:
         """Takes in that handles are pulled elsewhere."""
@@ -117,15 +121,7 @@ class FairProblem:
 
     def stage(self, state: State, share: float, blur: float, settings: ProjectionSettings) -> Stage:
         """A run of guided projection from ``state`` on; for the others see :meth:`terms`."""
-        return Stage(
-            name="fair",
-            blocks=state,
-            terms=lambda: self.terms(share, blur),
-            version=(self.pulls.version, share, blur),
-            settings=settings,
-            fixed={"vertices": self.stays() | self.pulls.held},
-            guard=self.admits,
-        )
+        return self._stage("fair", state, lambda: self.terms(share, blur), (share, blur), settings)
 
     def shares(self, vertices: Tensor) -> list[float]:
         """How far the constraints that the ``vertices`` (V, 3) violate are imposed, stage after stage; the last is 1.
@@ -154,7 +150,7 @@ class FairProblem:
             *self._boundary(),
             *self._loosely(),
             *self._fairness(),
-            *self._quality(),
+            *self.bounds.terms(settings),
             *self.pulls.terms(weight=settings.handle_weight),
             *self.panels.planar_terms(share),
             *self.panels.nearly_planar_terms(share),
@@ -170,7 +166,7 @@ class FairProblem:
             *self._boundary(),
             *self._loosely(),
             *c.displacement_fairness_terms(self.vertices, self.topology, weight=settings.fairness_weight),
-            *self._quality(),
+            *self.bounds.terms(settings),
             *self.pulls.terms(weight=settings.handle_weight),
             *self.panels.planar_terms(share),
             *self.panels.flat_terms(share),
@@ -178,12 +174,23 @@ class FairProblem:
 
     def planar_stage(self, state: State, share: float) -> Stage:
         """A run of guided projection with :meth:`planar_terms`."""
+        blocks = {"vertices": state["vertices"]}
+        return self._stage("planar", blocks, lambda: self.planar_terms(share), (share,), self.settings.stage())
+
+    def _stage(
+        self,
+        name: str,
+        blocks: State,
+        terms: Callable[[], list[ElementTerm]],
+        version: tuple[float, ...],
+        settings: ProjectionSettings,
+    ) -> Stage:
         return Stage(
-            name="planar",
-            blocks={"vertices": state["vertices"]},
-            terms=lambda: self.planar_terms(share),
-            version=(self.pulls.version, share),
-            settings=self.settings.stage(),
+            name=name,
+            blocks=blocks,
+            terms=terms,
+            version=(self.pulls.version, *version),
+            settings=settings,
             fixed={"vertices": self.stays() | self.pulls.held},
             guard=self.admits,
         )
@@ -305,34 +312,6 @@ class FairProblem:
         places = self.vertices[chosen]
         return c.handle_terms(chosen, places, weight=self.settings.boundary_weight, name="corners")
 
-    def _quality(self) -> list[ElementTerm]:
-        settings = self.settings
-        angles, smallest = corner_angles(self.vertices, self.topology), self._smallest_angle
-        safe = angles.clamp(max=max(_SAFE_ANGLE, 2.0 * smallest)).clamp_min(smallest + _LEAST_SAFETY)
-        weight, most = settings.quality_weight, self.largest_areas
-        return [
-            *([] if most is None else growth_terms(self.topology, most, weight=weight)),
-            *c.corner_angle_terms(self.topology, smallest, safe, weight=weight),
-            *c.face_area_terms(
-                self.topology, face_areas(self.vertices, self.topology), smallest=settings.smallest_area, weight=weight
-            ),
-        ]
-
-    @property
-    def largest_areas(self) -> Tensor | None:
-        """(F,) that no face exceeds; handles may stretch faces as they need."""
-        settings = self.settings
-        if not (settings.quality_weight and settings.largest_area) or self.pulls.everywhere:
-            return None
-        bounded = settings.largest_area < math.inf and not bool(self.pulls.pulled.any())
-        return settings.largest_area * own_sizes(self.vertices, self.topology) if bounded else None
-
-    @cached_property
-    def _smallest_angle(self) -> float:
-        """Radians that no corner angle falls below."""
-        smallest = float(corner_angles(self.vertices, self.topology).min())
-        return min(self.settings.smallest_angle, smallest * (1.0 - 1e-9))
-
     # ---- guards ----------------------------------------------------------------------------------------
 
     def placed(self, state: State) -> Tensor:
@@ -359,9 +338,11 @@ class FairProblem:
             self.vertices,
             self.topology,
             self.placed,
-            smallest_angle=bounded * self._smallest_angle,
+            smallest_angle=bounded * self.bounds.smallest_angle(self.settings),
             smallest_area=bounded * self.settings.smallest_area,
-            largest_areas=self.largest_areas,
+            sides=self.bounds.sides,
+            smallest_edge=bounded * self.settings.smallest_edge,
+            largest_areas=self.bounds.largest_areas(self.settings),
             from_last=self.near.design_mode or self.pulls.everywhere,
             may_turn=self.pulls.everywhere or self.settings.faces_may_turn,
         )

@@ -11,6 +11,7 @@ from torch import Tensor
 from ...errors import MeshError
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..handles import vertex_numbers
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
@@ -20,7 +21,6 @@ from .measures import fair_measures, fair_promises, located
 from .plan import FairPlan
 from .problem import FairProblem, feature_curves
 from .refinement import refined
-from .settings import FairSettings
 
 
 class FairRecipe(Recipe[FairSettings]):
@@ -88,7 +88,7 @@ class FairRecipe(Recipe[FairSettings]):
     def take_settings(self, settings: FairSettings) -> None:
         """Takes other weights."""
         super().take_settings(settings)
-        self.problem.settings = settings
+        self.problem.take_settings(settings)
 
     def reconsider(self) -> None:
         """Where a handle leaves the reference surface, that is given up."""

@@ -10,9 +10,9 @@ from torch import Tensor
 
 from ...geometry import corner_angles, face_area_vectors
 from ...geometry._ops import dot
+from ...settings.fair_settings import FairSettings
 from ...subdivision import Origin, Refinement, hybrid, midpoint
 from .problem import FairProblem
-from .settings import FairSettings
 
 if TYPE_CHECKING:
     from .recipe import FairRecipe

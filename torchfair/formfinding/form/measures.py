@@ -18,9 +18,9 @@ from ...geometry import corner_angles, edge_lengths, face_normals, vertex_normal
 from ...geometry.planarity import planarity
 from ...measuring import fold_measures
 from ...measuring.trust import LARGEST_DIHEDRAL, explained_variation
+from ...settings.form_settings import FormSettings
 from ...topology import Topology
 from ..job.promises import Promise, handle_promise
-from .settings import FormSettings
 
 _ON_THE_CURVES = 1e-6  # mean edge lengths
 _TANGENT = 1.0  # degrees

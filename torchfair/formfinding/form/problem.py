@@ -18,11 +18,11 @@ from ...linear import Factor, factorise
 from ...measuring.trust import LARGEST_DIHEDRAL
 from ...normalisation import Normalisation
 from ...projection import ElementTerm, LogAbsolute, SmoothAbsolute
+from ...settings.form_settings import FormSettings
 from ...topology import Topology
 from ..job.pulls import Pulls
 from .boundary_track import BoundaryTrack
 from .rim import Rim
-from .settings import FormSettings
 
 _EXACTLY = 10.0  # weight of tangent planes in the end, over that on the way
 _EVENED = 0.2  # of the extent of the mesh

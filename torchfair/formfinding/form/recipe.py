@@ -12,6 +12,7 @@ from ...energies import total_absolute_curvature
 from ...errors import MeshError, SettingsError
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
+from ...settings.form_settings import FormSettings
 from ...subdivision import catmull_clark, loop
 from ...topology import Topology
 from ...triangulation import triangulate
@@ -24,7 +25,6 @@ from .other_starts import Start, other_starts
 from .plan import FormPlan
 from .problem import FormProblem, staying_vertices
 from .rim import Rim, check_rim
-from .settings import FormSettings
 from .several_starts import FAR, SeveralStarts
 
 

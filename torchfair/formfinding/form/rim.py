@@ -8,6 +8,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from ..._names import PlacedError, few
 from ...curves import ClosedCurve
 from ...errors import MeshError, ShapeError
 from ...subdivision import Refinement
@@ -112,7 +113,7 @@ def _unit_normals(normals: Tensor | None, topology: Topology) -> Tensor:
         raise MeshError("prescribed normals must be finite; give zeros where none is prescribed")
     inside = torch.nonzero((lengths[:, 0] > 0.0) & ~topology.is_boundary_vertex).squeeze(1).tolist()
     if inside:
-        raise MeshError(f"normals are prescribed at boundary vertices only, not at vertices {inside[:5]}")
+        raise PlacedError("normals are prescribed at boundary vertices only, not at vertices ", few("vertex", inside))
     return torch.where(lengths > 0.0, given / lengths.clamp_min(1e-300), given)
 
 

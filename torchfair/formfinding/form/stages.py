@@ -8,10 +8,10 @@ from torch import Tensor
 
 from ...projection import ProjectionSettings
 from ...projection.layout import State
+from ...settings.form_settings import FormSettings
 from ..face_guard import FaceGuard
 from ..job.plan import Stage
 from .problem import FormProblem
-from .settings import FormSettings
 
 _ROUGHLY, _THOROUGHLY = 10.0, 0.1  # tolerances of stages along normals, over those in space
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from ..._names import FROM_ZERO, Names, Sentence
+
 HANDLE_REACHED = 0.05  # mean edge lengths
 
 
@@ -32,7 +34,7 @@ class Promise:
     unit: str = ""
     remedy: str = ""
     of_settings: float | None = None
-    where: str = ""
+    where: str | Sentence = ""
     slack: float = 1e-6
 
     @property
@@ -44,6 +46,10 @@ class Promise:
         return self.reached >= self.asked - allowance
 
     def __str__(self) -> str:
+        return self.told()
+
+    def told(self, names: Names = FROM_ZERO) -> str:
+        """As text, with faces and vertices called by their names."""
         unit = f" {self.unit}" if self.unit else ""
         bound = f"{self.sense} {self.asked:.3g}"
         if self.of_settings is None or self.of_settings == self.asked:
@@ -52,7 +58,7 @@ class Promise:
             words = f"{self.name} {self.reached:.3g}{unit}, {bound} as at the start ({self.of_settings:.3g} asked for)"
         if self.holds:
             return words
-        return "; ".join(filter(None, (f"{words}: NOT REACHED", self.where, self.remedy)))
+        return "; ".join(filter(None, (f"{words}: NOT REACHED", self._where(names), self.remedy)))
 
     def as_dict(self) -> dict[str, object]:
         """For reports."""
@@ -64,8 +70,11 @@ class Promise:
             "unit": self.unit,
             "holds": self.holds,
             "of_settings": self.of_settings,
-            "where": self.where,
+            "where": self._where(),
         }
+
+    def _where(self, names: Names = FROM_ZERO) -> str:
+        return self.where if isinstance(self.where, str) else self.where.told(names)
 
 
 def handle_promise(away: float, edge: float, *, remedy: str, unit: str = "") -> Promise:

@@ -10,11 +10,11 @@ from ...normalisation import Normalisation
 from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
 from ...projection import Callback, ProjectionResult
+from ...settings.symmetric_settings import SymmetricSettings
 from ...topology import Topology
 from ..job import Session
 from ..references import GivenReference
 from .recipe import SymmetricRecipe
-from .settings import SymmetricSettings
 
 
 class SymmetricDesign:

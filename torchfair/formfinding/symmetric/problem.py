@@ -18,11 +18,11 @@ from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
+from ...settings.symmetric_settings import SymmetricSettings
 from ..face_guard import FaceGuard
 from ..job.plan import Stage
 from ..job.pulls import Pulls
 from .kept_shape import KeptShape, Missed
-from .settings import SymmetricSettings
 
 _SAFE_ANGLE = 2.5  # smallest angles at which the barrier sets in
 _KEPT_ENERGY = 0.01  # weight of E over that of the shape that is kept: vertices slide to where E is low

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from ...settings.symmetric_settings import SymmetricSettings
 from ..job.promises import Promise, handle_promise
 from .kept_shape import LARGEST_DISTANCE, MORE_ENERGY
-from .settings import SymmetricSettings
 
 _LEAST_AREA = 0.9  # of that of the mesh that was given, where the shape is kept
 _LEAST_FREE_AREA = 0.5  # where it is free; below, the mesh has begun to collapse

@@ -14,6 +14,7 @@ from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
+from ...settings.symmetric_settings import SymmetricSettings
 from ..job import JobResult, Level, OneStage, Plan, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference, surface_of
 from .changes import Changes
@@ -22,7 +23,6 @@ from .plan import SettlingPlan, SymmetricPlan
 from .problem import Aim, SymmetricProblem
 from .promises import symmetric_promises
 from .refinement import refined
-from .settings import SymmetricSettings
 from .strip_normals import strip_normals
 
 

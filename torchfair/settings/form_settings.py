@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from ...errors import SettingsError
-from ...projection import ProjectionSettings
-from ...settings import setting
-from ..checks import check_choice, check_weights
-from ..printed import printed_projection
+from ..errors import SettingsError
+from .checks import check_choice, check_weights
+from .printed import printed_projection
+from .projection_settings import ProjectionSettings
+from .setting import setting
 
 Boundary = Literal["fixed", "glide"]
 Formulation = Literal["reduced", "lifted"]

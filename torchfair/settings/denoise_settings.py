@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
-from ..._numbers import check_number
-from ...errors import SettingsError
-from ...projection import ProjectionSettings
-from ...settings import setting
-from ..checks import check_choice, check_weights
+from .._numbers import check_number
+from ..errors import SettingsError
+from .checks import check_choice, check_weights
+from .projection_settings import ProjectionSettings
+from .setting import setting
 
 Boundary = Literal["free", "fixed"]
 _DIRECT_LIMIT = 100_000  # unknowns; above, factors cost more time and memory than iterations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..projection import ProjectionSettings
+from .projection_settings import ProjectionSettings
 
 
 def printed_projection(w_reg: float, steps: int) -> ProjectionSettings:

@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
-from ..._numbers import check_number, is_number
-from ...errors import SettingsError
-from ...projection import ProjectionSettings
-from ...settings import setting
-from ..checks import check_choice, check_weights
-from ..printed import printed_projection
+from .._numbers import check_number, is_number
+from ..errors import SettingsError
+from .checks import check_choice, check_weights
+from .printed import printed_projection
+from .projection_settings import ProjectionSettings
+from .setting import setting
 
 Boundary = Literal["glide", "fixed", "free"]
 Planar = Literal["keep", "quads", "none"]
@@ -79,6 +79,8 @@ class FairSettings:
         direction_weight: Weight of half the squared sideways components of edges that keep their directions.
         smallest_angle: No corner angle falls below this (or below the smallest of the input), radians.
         smallest_area: No face falls below this fraction of its area.
+        smallest_edge: No side of a polygon with more than three corners falls below this fraction of its length, or of
+            the mean edge length where that is less. (Those of triangles are kept by angle and area.)
         largest_area: No face grows above this many times its area, or half the mean area where that is more, unless
             handles stretch it.
         faces_may_turn: Whether faces may turn over against the start where handles pull, step by step: for shapes that
@@ -116,6 +118,7 @@ class FairSettings:
     direction_weight: float = 30.0
     smallest_angle: float = setting(math.radians(10.0), unit="radians")
     smallest_area: float = 0.2
+    smallest_edge: float = 0.2
     largest_area: float = 3.0
     faces_may_turn: bool = False
     quality_weight: float = 0.1
@@ -186,6 +189,7 @@ class FairSettings:
         for name in (
             "smallest_angle",
             "smallest_area",
+            "smallest_edge",
             "planar_tolerance",
             "planar_distance",
             "flat_tolerance",

@@ -8,7 +8,7 @@ from typing import Literal
 
 from .._numbers import check_count, check_number
 from ..errors import SettingsError
-from ..settings import setting
+from .setting import setting
 
 _SHORTEST = 1 / 16  # smoothing length in edges, where curvature is fitted over two rings
 

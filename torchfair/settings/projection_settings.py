@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from .._numbers import check_count, check_number
-from .._shown import shown
+from .._solver_names import SOLVERS
 from ..errors import SettingsError
-from ..linear import LinearSolver
-from ..linear.choose import SOLVERS
-from ..settings import setting
+from .setting import setting
+
+if TYPE_CHECKING:
+    from ..linear import LinearSolver
+else:
+    LinearSolver = Any  # those who ask for the types of fields do not need torch for them
 
 DampingScale = Literal["diagonal", "identity"]
 WhenSettled = Literal["go on", "judge", "stop"]
@@ -80,6 +83,8 @@ class ProjectionSettings:
         if settings is None:
             return cls()
         if not isinstance(settings, cls):
+            from .._shown import shown
+
             raise SettingsError(f"settings must be ProjectionSettings(...) or None, got {shown(settings)}")
         return settings
 

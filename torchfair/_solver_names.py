@@ -1,0 +1,3 @@
+"""Names of linear solvers, for settings and for :mod:`torchfair.linear`, which makes them."""
+
+SOLVERS = ("auto", "dense", "scipy", "rslab", "cg")
