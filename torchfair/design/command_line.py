@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from collections.abc import Mapping
 from typing import Any
@@ -11,66 +10,71 @@ import numpy as np
 
 from .document import Document
 
-_NOT_WORDS = {  # options that are not named like their weights, as of torchfair.cli
-    "handle": "handle-weight",
-}
+_OPTIONS = {"handle": "handle-weight"}
+"""Options that are not called like their weights."""
+_EXACT = "does the whole job from the start; what was dragged may rest in another minimum near by"
+_ROUGHLY = "leads there step by step, to another minimum near by; save the mesh where its last digits count"
 
 
 def command_line(document: Document) -> tuple[str, bool, str]:
-    """The commands, one a line; whether they lead to the same minimum for sure; and a sentence about them."""
-    first, *others = document.history
+    """The commands, one a line; whether one command on the file itself is all; and a sentence about them.
+
+    Intermediate meshes are ``step1.obj`` and so on. Refinements in the end are levels of the job.
+    """
+    first, *steps = document.history
     source, repair = str(first["source"]), [f"--{word.replace('_', '-')}" for word in first.get("repair", ())]
-    steps = list(others)
-    levels = 0
-    while steps and steps[-1]["do"] == "subdivide" and steps[-1].get("mode", document.mode) == document.mode:
-        steps.pop()
-        levels += 1
     lines: list[str] = []
     for number, step in enumerate(steps, 1):
         target = f"step{number}.obj"
-        lines.append(_line([*_words(step), source, *repair, "-o", target]))
+        command, *options = _words(step)
+        lines.append(_line(["torchfair", command, source, *options, *repair, "-o", target]))
         source, repair = target, []
-    if lines == [] and levels == 0 and np.array_equal(document.start, document.vertices):
-        return _line(["torchfair", "measure", source, *repair]), True, "nothing has moved yet"
-    job = {
+    job = job_step(document)
+    if not job["levels"] and np.array_equal(document.start, document.vertices):
+        if not lines:
+            return _line(["torchfair", "measure", source, *repair]), True, "nothing has moved yet"
+        return "\n".join(lines), False, _ROUGHLY
+    command, *options = _words(job)
+    lines.append(_line(["torchfair", command, source, *options, *repair, "-o", "result.obj"]))
+    exact = len(lines) == 1 and not job["levels"] and not (document.held and document.mode == "form")
+    return "\n".join(lines), exact, _EXACT if exact else _ROUGHLY
+
+
+def job_step(document: Document) -> dict[str, Any]:
+    """The job that makes a document what it is, with vertices as they are called in the mesh that it starts from."""
+    *_, root = document.levels()
+    own = len(root.history) == 1  # a file, not an intermediate mesh, which would be an OBJ file
+    names = root.names if own else np.arange(1, root.count + 1)
+
+    def called(vertex: int) -> int:
+        return vertex if names is None else int(names[vertex])
+
+    handles = {called(v): list(place) for v, place in document.handles.items() if v < root.count}
+    return {
         "do": document.mode,
-        "handles": {str(vertex): list(place) for vertex, place in document.handles.items()},
-        "held": list(document.held),
-        "weights": document.weights.get(document.mode, {}),
-        "choices": document.choices.get(document.mode, {}),
+        "handles": [[vertex, *place] for vertex, place in handles.items()],
+        "held": [called(vertex) for vertex in document.held if vertex < root.count],
+        "weights": dict(document.weights.get(document.mode, {})),
+        "choices": dict(document.choices.get(document.mode, {})),
+        "levels": sum(1 for _ in document.levels()) - 1,
     }
-    more = ["--levels", str(levels)] if levels else []
-    words = _words(job, held=document.mode != "form")
-    lines.append(_line([*words[:2], source, *words[2:], *repair, *more, "-o", "result.obj"]))
-    exact = not lines[:-1] and not levels and not (document.held and document.mode == "form")
-    sentence = (
-        "does the same from the start; a mesh that was dragged may rest in another minimum near by"
-        if exact
-        else "leads there step by step; save the mesh where it has to be this one to the last digit"
-    )
-    return "\n".join(lines), exact, sentence
 
 
-def _words(step: Mapping[str, Any], *, held: bool = True) -> list[str]:
+def _words(step: Mapping[str, Any]) -> list[str]:
+    """A command and its options."""
     kind = step["do"]
-    if kind == "subdivide":
-        return ["torchfair", "subdivide"]
     if kind == "mesh":
-        return ["torchfair", "mesh", f"--{step['kind']}", str(step["count"])]
-    words = ["torchfair", kind]
-    for vertex, place in step["handles"].items():
-        words += ["--handle", str(vertex), *(_number(value) for value in place)]
-    if step["held"] and held:
+        return ["mesh", f"--{step['kind']}", str(step["count"])]
+    words = [kind]
+    for vertex, *place in step["handles"]:
+        words += ["--handle", str(vertex), *map(repr, place)]
+    if step["held"] and kind != "form":
         words += ["--fix", *map(str, step["held"])]
     for name, value in step["weights"].items():
-        words += [f"--{_NOT_WORDS.get(name, name.replace('_', '-'))}", _number(value)]
+        words += [f"--{_OPTIONS.get(name, name.replace('_', '-'))}", repr(float(value))]
     for name, value in step["choices"].items():
         words += [f"--{name.replace('_', '-')}", value]
-    return words
-
-
-def _number(value: float) -> str:
-    return repr(float(value)) if math.isfinite(value) else "0"
+    return [*words, "--levels", str(step["levels"])] if step["levels"] else words
 
 
 def _line(words: list[str]) -> str:

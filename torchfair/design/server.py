@@ -176,7 +176,7 @@ class DesignServer:
         """Why a window is not let in: code and reason; None where it is."""
         try:
             message = await asyncio.wait_for(connection.recv(), _HELLO)
-        except asyncio.TimeoutError:
+        except TimeoutError:
             return 4408, "no hello"
         except ConnectionClosed:
             return 1000, ""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import Enum
+from enum import StrEnum
 
 
-class DesignState(str, Enum):
+class DesignState(StrEnum):
     """What a design is doing."""
 
     EMPTY = "EMPTY"

@@ -13,7 +13,7 @@ import torch
 from ...errors import MeshError, TorchfairError
 from ...io import PolygonMesh, edge_labels_path, load_edge_labels, load_mesh
 from ...shapes import EXAMPLES, SURFACES, builtin_mesh
-from ..document import Document
+from ..document import Document, Ints
 from ..limits import MOST_VERTICES
 from ..questions import REPAIRS, answers
 from ..session_file import SUFFIX, read_session
@@ -103,7 +103,6 @@ def document_of(mesh: PolygonMesh, title: str, path: Path | None = None, repair:
         raise MeshError(f"the mesh has {topology.num_vertices} vertices, at most {MOST_VERTICES} can be designed with")
     vertices = mesh.vertices.to(torch.float64).numpy().copy()
     marks = None if path is None else _marks(mesh, path)
-    names = None if mesh.names.vertices is None else np.asarray(mesh.names.vertices, np.int64)
     first: dict[str, Any] = {"do": "open", "source": title, "repair": list(repair)}
     return Document(
         title=Path(title.removeprefix("example:")).stem if path is not None else title.removeprefix("example:"),
@@ -112,9 +111,18 @@ def document_of(mesh: PolygonMesh, title: str, path: Path | None = None, repair:
         start=vertices,
         vertices=vertices,
         principal=marks,
-        names=names,
+        names=_names(mesh),
         history=(first,),
     )
+
+
+def _names(mesh: PolygonMesh) -> Ints | None:
+    """(V,) number of each vertex in the file; None where they are the same."""
+    names = mesh.names
+    if names.vertices is None and names.first == 0:
+        return None
+    rows = np.arange(mesh.topology.num_vertices) if names.vertices is None else np.asarray(names.vertices)
+    return rows.astype(np.int64) + names.first
 
 
 def _marks(mesh: PolygonMesh, path: Path) -> np.ndarray | None:

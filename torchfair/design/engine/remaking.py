@@ -12,6 +12,7 @@ import torch
 from ...errors import MeshError
 from ...meshing import principal_quads, principal_triangles
 from ...principal import PrincipalEdges, misalignment_of
+from ..command_line import job_step
 from ..document import Document
 from ..limits import MOST_VERTICES
 from .recipes import faces_of, principal_of, session_of, topology_of
@@ -46,7 +47,6 @@ def _subdivided(document: Document, options: Mapping[str, Any]) -> tuple[Documen
         handles={vertex: (x, y, z) for vertex, (x, y, z) in recipe.handles.items()},
         held=tuple(held),
         names=None if document.names is None else _kept_names(document.names, len(vertices)),
-        history=(*document.history, {"do": "subdivide"}),
         words="subdivide",
     )
     return finer, [f"{document.count} vertices became {finer.count}"]
@@ -96,18 +96,9 @@ def _meshed(document: Document, options: Mapping[str, Any]) -> tuple[Document, l
 
 def _job(document: Document) -> list[dict[str, Any]]:
     """The job that made the document what it is, for the command line; none where nothing has moved."""
-    if np.array_equal(document.start, document.vertices):
+    if document.coarse is None and np.array_equal(document.start, document.vertices):
         return []
-    mode = document.mode
-    return [
-        {
-            "do": mode,
-            "handles": {str(vertex): list(place) for vertex, place in document.handles.items()},
-            "held": list(document.held),
-            "weights": dict(document.weights.get(mode, {})),
-            "choices": dict(document.choices.get(mode, {})),
-        }
-    ]
+    return [job_step(document)]
 
 
 def _labelled(document: Document, options: Mapping[str, Any]) -> tuple[Document, list[str]]:
