@@ -57,8 +57,9 @@ def test_fields_that_there_are_not_are_refused(kind: str) -> None:
 
 NO_COMMANDS = [
     "", "{", "[]", "3", "null", '{"type": 3}', '{"type": "exec"}', '{"type": "__init__"}',
-    '{"type": "list", "id": true}', '{"type": "list", "id": 1.5}', '{"type": "worst", "count": NaN}', '{"type": "worst", "count": Infinity}',
-    "[" * 100_000, '{"type": "upload", "name": "a.obj", "bytes": "abc"}', '{"type":"list"}' + " " * MOST_JSON,
+    '{"type": "list", "id": true}', '{"type": "list", "id": 1.5}', '{"type": "worst", "count": NaN}',
+    '{"type": "worst", "count": Infinity}', "[" * 100_000, '{"type": "upload", "name": "a.obj", "bytes": "abc"}',
+    '{"type":"list"}' + " " * MOST_JSON,
 ]  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import MeshFileError
 from ..io import atomic_write_bytes
-from .session_file import SUFFIX
+from .session_file import KEPT
 
 _PAUSE = 3.0  # seconds between two of them
 
@@ -17,7 +17,7 @@ _PAUSE = 3.0  # seconds between two of them
 def autosave_path(folder: Path, title: str) -> Path:
     """Where the design of that title is kept: a hidden session file."""
     plain = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in title)[:80]
-    return folder / f".{plain or 'design'}.autosave{SUFFIX}"
+    return folder / f".{plain or 'design'}{KEPT}"
 
 
 class Keeper:

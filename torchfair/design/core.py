@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from .commands import Command, CommandRefused
@@ -12,6 +13,7 @@ from .effects import Ask, Autosave, Effect, StartEngine, Tell
 from .engine import requests as r
 from .folder import Folder
 from .history import History
+from .questions import kept_question
 from .session_file import session_bytes
 from .states import DesignState, allowed
 from .telling import done_messages, dragged_words, error_message, handles_message, notice, state_message
@@ -141,6 +143,14 @@ class Core:
         views = tuple(dict.fromkeys(view for views in self.windows.values() for view in views))
         return Ask(r.Watch(self.serial, views, self.worst))
 
+    def ask(self, sentence: str, choices: Iterable[tuple[str, str]]) -> list[Effect]:
+        """Asks all windows; :attr:`pending` says what it is about."""
+        self.questions += 1
+        listed = [{"value": value, "words": words} for value, words in choices]
+        question = {"type": "question", "question": self.questions, "sentence": sentence, "choices": listed}
+        self.question = question
+        return [Tell(question), *self.tell_state()]
+
     def done(self, window: int, command: Command) -> list[Effect]:
         """Tells that a command has been carried out."""
         return done_messages(window, command.id)
@@ -170,7 +180,11 @@ class Core:
         start: list[Effect] = []
         if self.state is S.FAILED:
             start, self._lost = [StartEngine()], []
-        busy = f"opens {opening.title or opening.name}"
+        name = opening.title or opening.name
+        if opening.data is None and not opening.fresh and self.folder.kept(Path(opening.name)) is not None:
+            self.pending, self.state = Pending(self.next_serial(), "open", None, window, id, "", opening), S.OPENING
+            return [*start, *self.ask(*kept_question(name))]
+        busy = f"opens {name}"
         asked = self.pend(
             S.OPENING, lambda serial: replace(opening, serial=serial), "open", window=window, id=id, busy=busy,
             extra=opening,

@@ -123,12 +123,7 @@ def _made(core: Core, pending: Pending, event: r.Made) -> list[Effect]:
 
 
 def _asked(core: Core, pending: Pending, event: r.Asked) -> list[Effect]:
-    core.questions += 1
-    choices = [{"value": value, "words": words} for value, words in event.choices]
-    core.question = {
-        "type": "question", "question": core.questions, "sentence": event.sentence, "choices": choices
-    }  # fmt: skip
-    return [Tell(core.question), *core.tell_state()]
+    return core.ask(event.sentence, event.choices)
 
 
 def _answered(core: Core, pending: Pending, event: r.Answered) -> list[Effect]:

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from .autosave import autosave_path
 from .commands import CommandRefused
 from .session_file import SUFFIX
 
@@ -38,6 +39,14 @@ class Folder:
                 kind = "session" if entry.suffix.lower() == SUFFIX else "mesh"
                 found.append({"name": entry.name, "bytes": entry.stat().st_size, "kind": kind})
         return found[:_MOST]
+
+    def kept(self, path: Path) -> Path | None:
+        """What was kept of the edits of a mesh file and never saved, if it is newer than the file."""
+        kept = autosave_path(self.path, path.stem)
+        try:
+            return kept if kept.is_file() and kept.stat().st_mtime > path.stat().st_mtime else None
+        except OSError:
+            return None
 
     def to_read(self, source: str, *, typed: bool) -> Path:
         """The file that a command names: in this folder, or anywhere if a person typed its path.

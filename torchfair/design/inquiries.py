@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from .command_line import command_line
 from .commands import Command, CommandRefused
@@ -12,7 +13,7 @@ from .edits import Handler
 from .effects import Autosave, Deliver, Effect, Store, Tell
 from .engine import requests as r
 from .formats import FORMATS, SESSION, examples
-from .questions import REPAIRS
+from .questions import FILE, KEPT, REPAIRS
 from .session_file import session_bytes
 from .states import DesignState
 
@@ -90,9 +91,18 @@ def _answer(core: Core, window: int, command: Command) -> list[Effect]:
     core.question = None
     if command["choice"] == choices[-1]:
         return [*core.rest(), *core.done(window, command)]
-    repair = REPAIRS[command["choice"]][0] if command["choice"] in REPAIRS else ()
-    opening = replace(pending.extra, repair=repair, asked=True)
+    opening = _answered(core, pending.extra, command["choice"])
     return [*core.open(opening, window, pending.id), *core.done(window, command)]
+
+
+def _answered(core: Core, opening: r.Open, choice: str) -> r.Open:
+    """What is opened after an answer."""
+    kept = core.folder.kept(Path(opening.name)) if choice == KEPT else None
+    if kept is not None:
+        return r.Open(0, str(kept), None, opening.title, asked=True, fresh=True)
+    if choice in (KEPT, FILE):
+        return replace(opening, fresh=True)
+    return replace(opening, repair=REPAIRS[choice][0] if choice in REPAIRS else (), asked=True, fresh=True)
 
 
 def _strips(core: Core, window: int, command: Command) -> list[Effect]:

@@ -6,6 +6,7 @@ import io
 import json
 import math
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ from .commands import COMMANDS
 from .document import MODES, Document, Faces
 
 SUFFIX = ".torchfair"
+KEPT = f".autosave{SUFFIX}"
+"""How names of session files end that nobody asked for."""
 VERSION = 1
 _LARGEST = 1 << 30
 """Bytes of all arrays together."""
@@ -106,7 +109,7 @@ def read_session(path: Path) -> StoredSession:
         raise MeshFileError(path, f"cannot be read ({error.strerror or error})") from None
     except MeshFileError:
         raise
-    except (zipfile.BadZipFile, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError,
+    except (zipfile.BadZipFile, zlib.error, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError,
             RecursionError, NotImplementedError, OverflowError) as error:  # fmt: skip
         raise MeshFileError(path, f"is no session file of torchfair ({error})") from None
 

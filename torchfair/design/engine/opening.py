@@ -16,7 +16,7 @@ from ...shapes import EXAMPLES, SURFACES, builtin_mesh
 from ..document import Document, Ints
 from ..limits import MOST_VERTICES
 from ..questions import REPAIRS, answers
-from ..session_file import SUFFIX, read_session
+from ..session_file import KEPT, SUFFIX, read_session
 from .recipes import faces_of
 from .requests import Asked, Event, Made, Open
 
@@ -50,8 +50,8 @@ def _example(name: str) -> Document:
 
 def _of_file(request: Open, path: Path, title: str) -> Event:
     if path.suffix.lower() == SUFFIX:
-        stored = read_session(path)
-        return Made(request.serial, stored.documents, stored.now, camera=stored.camera, is_session=True)
+        stored, kept = read_session(path), path.name.endswith(KEPT)
+        return Made(request.serial, stored.documents, stored.now, camera=stored.camera, is_session=not kept)
     options = dict.fromkeys(request.repair, True)
     try:
         mesh = load_mesh(path, **options)

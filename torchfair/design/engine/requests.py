@@ -67,7 +67,8 @@ class Open(Request):
         data: What is uploaded; None for a file.
         title: What the mesh shall be called.
         repair: As of :func:`torchfair.io.load_mesh`: some of repair, weld, split_edges.
-        asked: Whether a person has decided, so that nothing is asked again.
+        asked: Whether a person has decided how it is read, so that nothing is asked again.
+        fresh: Whether a person has decided to open the file itself, not what was kept of its edits.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Open(Request):
     title: str = ""
     repair: tuple[str, ...] = ()
     asked: bool = False
+    fresh: bool = False
 
 
 @dataclass(frozen=True)
