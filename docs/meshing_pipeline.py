@@ -64,7 +64,7 @@ def crosses(found: SeamlessMap, angles: np.ndarray, length: float, chosen: np.nd
     for turn in (0.0, np.pi / 2):
         turned = angles[chosen] + turn
         along = np.cos(turned)[:, None] * frames.first[chosen] + np.sin(turned)[:, None] * frames.second[chosen]
-        centres = frames.points[frames.triangles[chosen]].mean(1)
+        centres = frames.centres[chosen]
         arms.append(np.stack([centres - length / 2 * along, centres + length / 2 * along], axis=1))
     return arms
 
@@ -95,7 +95,7 @@ def cut_lines(found: SeamlessMap) -> np.ndarray:
 
 def spread(found: SeamlessMap, distance: float) -> np.ndarray:
     """Numbers of triangles that are so far apart, in a fixed order."""
-    centres = found.frames.points[found.frames.triangles].mean(1)
+    centres = found.frames.centres
     chosen: list[int] = []
     for face in np.random.default_rng(0).permutation(len(centres)).tolist():
         if not chosen or np.linalg.norm(centres[chosen] - centres[face], axis=1).min() > distance:

@@ -10,7 +10,7 @@ from _mirrors import panel_width, panels
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.energies import normal_variation, total_absolute_curvature
+from torchfair.energies import normal_variation
 from torchfair.formfinding import planar_quads
 from torchfair.geometry import planarity
 from torchfair.meshing import QuadMesh, principal_quads
@@ -45,9 +45,9 @@ def chain(surface: Mesh, count: int) -> Chain:
     return Chain(meshed, planar, {QUADS: meshed.report, PLANAR: planar.report, **said})
 
 
-def figures_on(surface: Mesh, vertices: Tensor, topology: Topology) -> Report:
-    """E of a mesh, C of the surface that it stands for, their ratio, and how far faces are from planar."""
-    energy, floor = float(normal_variation(vertices, topology)), float(total_absolute_curvature(*surface))
+def figures_on(meshed: QuadMesh, vertices: Tensor, topology: Topology) -> Report:
+    """E of a mesh, C of the surface of principal quads that it stands for, their ratio, and planarity."""
+    energy, floor = float(normal_variation(vertices, topology)), meshed.surface.total_absolute_curvature
     deviation = planarity(vertices, topology)
     return {
         "vertices": topology.num_vertices,

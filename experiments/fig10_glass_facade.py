@@ -85,7 +85,7 @@ def experiment(config: Config, results: Results) -> Report:
     panelled = as_many_panels(reference, curves, quads.meshed.topology.num_faces)
     meshes = {TRIANGLES: surface, PANELS: panelled, **quads.meshes()}
     scores = reflection_scores(meshes, reference, config.size)
-    report = {name: {**figures_on(surface, *mesh), **scores[name]} for name, mesh in meshes.items()}
+    report = {name: {**figures_on(quads.meshed, *mesh), **scores[name]} for name, mesh in meshes.items()}
     for name, mesh in meshes.items():
         results.mesh(FILES[name], *mesh)
     draw(config, meshes, reference, report, results)

@@ -45,7 +45,7 @@ def stages_of(surface: Mesh, quads: int) -> tuple[dict[str, Mesh], Report]:
     faired = minimise_normal_variation(*surface)
     made = chain(surface, quads)
     meshes = dict(zip(STAGES, [surface, (faired.vertices, faired.topology), *made.meshes().values()], strict=True))
-    report = {name: figures_on(surface, *mesh) for name, mesh in meshes.items()}
+    report = {name: figures_on(made.meshed, *mesh) for name, mesh in meshes.items()}
     return meshes, {
         "stages": report,
         "chain": made.report,

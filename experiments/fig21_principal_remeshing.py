@@ -51,7 +51,7 @@ def experiment(config: Config, results: Results) -> Report:
     surface = (found.vertices, found.topology)
     quads = chain(surface, config.quads)
     meshes = {SURFACE: surface, **quads.meshes()}
-    report = {name: figures_on(surface, *mesh) for name, mesh in meshes.items()}
+    report = {name: figures_on(quads.meshed, *mesh) for name, mesh in meshes.items()}
     for name, row in report.items():
         results.mesh(FILES[name], *meshes[name])
         print(f"{name}: {in_words(row)}")

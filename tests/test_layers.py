@@ -11,8 +11,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 FLOORS = (
     {"errors", "_interrupts", "_shown", "_solver_names", "_threads"},
-    {"_names", "_numbers", "_ranges", "cameras", "linear", "progress", "rasterisation"},
-    {"_half_edges", "settings"},
+    {"_names", "_numbers", "_ranges", "_staged", "cameras", "linear", "progress", "rasterisation"},
+    {"_atomic", "_half_edges", "settings"},
     {"_connectivity", "projection"},
     {"topology"},
     {"_graph"},

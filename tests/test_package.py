@@ -39,7 +39,8 @@ def test_neither_torch_nor_numpy_is_imported_before_there_is_work() -> None:
     words = (
         [["--help"], ["--version"], ["sing"], ["measure", "--loud"], ["measure", "--help"], ["fair", "roof.obj"]]
         + [[job, "--help"] for job in ("fair", "form", "symmetric", "denoise", "mesh", "subdivide", "reflect")]
-        + [["fair", "roof.obj", "-o", "x.obj", "--smoothing", "soft"]]
+        + [["fair", "roof.obj", "-o", "x.obj", "--smoothing", "soft"], ["fair", "roof.obj", "-o", "x.txt"]]
+        + [["fair", "roof.obj", "-o", "x.obj", "--smallest-area", "2"], ["fair", "a/x.obj", "b/x.obj", "-o", "out"]]
     )
     lines = "; ".join(f"main({line})" for line in words)
     code = (
@@ -47,7 +48,7 @@ def test_neither_torch_nor_numpy_is_imported_before_there_is_work() -> None:
         "with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:\n"
         f"    from torchfair.cli import main; {lines}\n"
         "assert out.getvalue().count('usage: ') == 9, out.getvalue()\n"
-        "assert err.getvalue().count('error: ') == 4, err.getvalue()"
+        "assert err.getvalue().count('error: ') == 7, err.getvalue()"
     )
     modules = modules_after(code)
     assert "torchfair.settings.fair_settings" in modules  # or no options were made
@@ -73,6 +74,13 @@ def test_all_names_are_there_for_people_and_type_checkers() -> None:
         assert getattr(torchfair, name) is torchfair.__dict__[name]  # looked for once
     with pytest.raises(AttributeError, match="'torchfair' has no attribute 'Topologie'"):
         _ = torchfair.Topologie
+
+
+def test_the_page_of_a_design_does_not_wait_for_torch_and_nothing_for_its_compiler() -> None:
+    """The server computes nothing; and no decorator loads what only torch.compile needs, a second long."""
+    pytest.importorskip("websockets")
+    assert sorted({"torch", "scipy"} & modules_after("import torchfair.design.server")) == []
+    assert "torch._dynamo" not in modules_after("import torchfair.design.engine.worker")
 
 
 def test_star_and_parts_need_no_import_of_their_own() -> None:

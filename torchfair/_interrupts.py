@@ -7,9 +7,10 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 _T = TypeVar("_T")
+_ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _here = threading.local()  # the interrupts that wait in this thread
 
 
@@ -22,6 +23,7 @@ class Interrupts:
 
     def __init__(self) -> None:
         self.pending = False
+        self._before: dict[int, Any] = {}
 
     def check(self) -> None:
         """Raises KeyboardInterrupt if one is waiting, which it then no longer is."""
@@ -82,20 +84,65 @@ class Interrupts:
 
     def _hold(self) -> None:
         """Lets Ctrl-C wait, unless the program has its own idea of it, or another thread than the main one asks."""
-        main = threading.current_thread() is threading.main_thread()
-        if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            with suppress(ValueError):  # an interpreter within another one has no signals
-                signal.signal(signal.SIGINT, self._note)
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number in (signal.SIGINT, *_ENDING):
+            handler = signal.getsignal(number)
+            if handler is signal.default_int_handler or isinstance(handler, LikeCtrlC):
+                with suppress(ValueError):  # an interpreter within another one has no signals
+                    signal.signal(number, self._note)
+                    self._before[number] = handler
 
     def _leave(self) -> None:
-        main = threading.current_thread() is threading.main_thread()
-        if main and signal.getsignal(signal.SIGINT) == self._note:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number, handler in self._before.items():
+            if signal.getsignal(number) == self._note:
+                signal.signal(number, handler)
+        self._before = {}
 
     def _note(self, number: int, frame: FrameType | None) -> None:
+        handler = self._before.get(number)
+        if isinstance(handler, LikeCtrlC):
+            handler.number = number
         if self.pending:
-            signal.default_int_handler(number, frame)
+            raise KeyboardInterrupt
         self.pending = True
+
+
+class LikeCtrlC:
+    """A handler of signals that end programs: they raise KeyboardInterrupt, which waits where that of Ctrl-C waits.
+
+    Attributes:
+        number: Of the last signal that came; None if none has.
+    """
+
+    def __init__(self) -> None:
+        self.number: int | None = None
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        self.number = number
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def ended_like_ctrl_c() -> Iterator[LikeCtrlC]:
+    """SIGTERM and SIGHUP (a terminal that is closed) act as Ctrl-C does in its body.
+
+    Where they are ignored, or the program has handlers of its own, and outside the main thread, that is left as it is.
+    """
+    handler, changed = LikeCtrlC(), []
+    if threading.current_thread() is threading.main_thread():
+        for number in _ENDING:
+            if signal.getsignal(number) is signal.SIG_DFL:
+                with suppress(ValueError):
+                    signal.signal(number, handler)
+                    changed.append(number)
+    try:
+        yield handler
+    finally:
+        for number in changed:
+            signal.signal(number, signal.SIG_DFL)
 
 
 @contextmanager

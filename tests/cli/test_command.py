@@ -12,6 +12,7 @@ from torchfair import MeshError
 from torchfair.cli import command, main
 from torchfair.cli.errors import CommandError
 
+ROOT = Path(__file__).resolve().parents[2]
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
@@ -137,3 +138,32 @@ sys.exit(f"parsing imported {{heavy}}" if heavy else main(["measure", {triangle_
         os.close(write)
     assert done.stderr == ""
     assert done.returncode == 141
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX systems")
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+@pytest.mark.parametrize("library", ["torch", "numpy"])
+def test_a_signal_while_libraries_are_loaded_leaves_no_traceback(
+    library: str, name: str, code: int, triangle_file: str, tmp_path: Path
+) -> None:
+    """A library that presses Ctrl-C itself stands in front of the true one."""
+    (tmp_path / f"{library}.py").write_text(f"import os, signal\nos.kill(os.getpid(), signal.{name})\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "torchfair", "measure", triangle_file],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])},
+    )
+    assert done.stderr == "torchfair measure: interrupted\n"
+    assert (done.returncode, done.stdout) == (code, "")
+
+
+def test_ctrl_c_while_the_command_line_itself_is_loaded(tmp_path: Path) -> None:
+    (tmp_path / "argparse.py").write_text("raise KeyboardInterrupt\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "torchfair", "--help"],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])},
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")

@@ -48,9 +48,9 @@ def test_quads_are_those_of_the_surface_that_is_written(
     assert len(quads.topology.boundary_loops()) == 2
     report = report_in(out)
     assert report["principal_quads"]["measures"]["faces"] == quads.topology.num_faces
-    assert report["energies"]["after"]["total_absolute_curvature"] == pytest.approx(
-        report["principal_quads"]["measures"]["total_absolute_curvature"]
-    )
+    floor = report["principal_quads"]["measures"]["total_absolute_curvature"]
+    assert floor == pytest.approx(expected.report["total_absolute_curvature"])
+    assert report["energies"]["after"]["total_absolute_curvature"] == pytest.approx(floor, rel=0.05)  # of triangles
     assert {path.name for path in out.iterdir()} == {"tube.obj", "tube-quads.obj", "tube.report.json"}
     said = capsys.readouterr().out
     assert "angle to principal directions" in said

@@ -14,8 +14,8 @@ from helpers import report_in, wavy_grid
 from torchfair.cli import main
 from torchfair.cli.inputs import read_input
 from torchfair.cli.job_command import JobCommand
-from torchfair.cli.outputs import Request
 from torchfair.cli.parser import CommandParser
+from torchfair.cli.request import Request
 from torchfair.formfinding import FairSettings, minimise_normal_variation
 from torchfair.io import load_mesh, save_mesh
 

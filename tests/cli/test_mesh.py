@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import torch
@@ -12,7 +14,7 @@ from helpers import report_in
 from PIL import Image
 
 from torchfair.cli import main
-from torchfair.cli.mesh import fill, options
+from torchfair.cli.mesh import fill, options, too_short
 from torchfair.cli.parser import CommandParser
 from torchfair.io import load_edge_labels, load_mesh, save_mesh
 from torchfair.meshing import MeshingSettings, principal_quads
@@ -89,6 +91,15 @@ def test_planar_quads(tmp_path: Path) -> None:
     assert report["measures"]["distance_max"] < 0.2
     assert report["measures"]["before_planar"]["faces"] == report["measures"]["faces"]
     assert report["not_reached"] == []
+
+
+def test_edges_that_are_nearly_collapsed_are_a_promise_missed() -> None:
+    def made(shortest: float) -> Any:
+        return SimpleNamespace(report={"shortest_edge": shortest})
+
+    assert too_short(made(0.02)) == []
+    (missed,) = too_short(made(0.0199))
+    assert missed.startswith("shortest edge 0.0199 mean edges, at least 0.02 asked for: NOT REACHED")
 
 
 def test_ctrl_c_keeps_the_best_mesh(

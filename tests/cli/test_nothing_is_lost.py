@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import shutil
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,7 +18,7 @@ from torchfair import MeshFileError
 from torchfair.cli import main
 from torchfair.cli.inputs import read_input
 from torchfair.cli.job_command import JobCommand
-from torchfair.cli.outputs import Request
+from torchfair.cli.request import Request
 from torchfair.formfinding import FairSettings, minimise_normal_variation
 from torchfair.io import load_mesh, save_mesh
 
@@ -127,6 +128,27 @@ def test_a_name_that_is_taken_meanwhile_is_left_alone(
     assert load_mesh(folder.out / "roof-3.obj").topology.num_faces == 8
 
 
+def test_a_file_that_another_process_holds_open_stays_and_the_result_is_beside(
+    folder: Folder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On Windows no file takes the name of one that is open."""
+    assert folder.run() == 0
+    before, real = folder.content(), os.replace
+
+    def refuse(source: Path, target: Path) -> None:
+        if target.name == "roof.report.json" and source.suffix == ".tmp" and not held:
+            held.append(source)
+            raise PermissionError(13, "The process cannot access the file")
+        real(source, target)
+
+    held: list[Path] = []
+    assert folder.run("--force", meanwhile=lambda: folder.monkeypatch.setattr(os, "replace", refuse)) == 2
+    after = folder.content()
+    assert {name: after[name] for name in before} == before
+    assert set(after) == ALL | {name.replace("roof", "roof-2") for name in ALL}
+    assert "roof.report.json: cannot be written (The process cannot access the file)" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("full", [("out",), ("out", "working"), ("out", "working", "home")])
 @pytest.mark.parametrize("fails_at", [1, 2])
 def test_on_a_full_disk_the_old_files_stay_and_the_new_ones_are_elsewhere(
@@ -188,6 +210,32 @@ def test_ctrl_c_while_pictures_are_drawn_says_which_are_missing(
     assert folder.names() == ALL - {"roof.two.png"}
     out = capsys.readouterr().out
     assert f"not written: {folder.out / 'roof.two.png'}\nnot written: {folder.out / 'roof.three.png'}" in out
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX systems")
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+def test_a_signal_between_the_job_and_its_files_costs_pictures_only(
+    folder: Folder, name: str, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The best mesh is known and not yet written: no moment loses it."""
+    number = getattr(signal, name)
+    handler = signal.getsignal(number)
+    assert folder.run(meanwhile=lambda: signal.raise_signal(number)) == code
+    assert folder.names() == {"roof.obj", "roof.report.json"}
+    assert f"not written: {folder.out / 'roof.one.png'}" in capsys.readouterr().out
+    assert signal.getsignal(number) is handler
+    assert folder.run("--force") == 0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX systems")
+def test_signals_that_are_ignored_stay_so(folder: Folder) -> None:
+    """As with nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        assert folder.run(meanwhile=lambda: signal.raise_signal(signal.SIGHUP)) == 0
+        assert folder.names() == ALL
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def links(out: Path) -> dict[str, Callable[[], object]]:

@@ -93,16 +93,21 @@ def test_what_ends_the_body_writes_nothing(tmp_path: Path, error: type[BaseExcep
     assert content(tmp_path) == {"mesh": "later"}
 
 
-def test_an_interrupt_between_two_names_puts_all_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("after", [False, True])
+def test_an_interrupt_between_two_names_puts_all_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: bool
+) -> None:
+    """Whether the second file has its name when the interrupt comes, or not yet."""
     write_all(tmp_path, "old")
     real: Callable[[Path, Path], None] = os.replace
     calls = []
 
     def interrupted(source: Path, target: Path) -> None:
         calls.append(target)
+        if len(calls) != 2 or after:
+            real(source, target)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        real(source, target)
 
     monkeypatch.setattr(os, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):

@@ -145,8 +145,8 @@ def test_chains_end_at_corners() -> None:
 def test_curvature_does_not_reach_across() -> None:
     """A tunnel of radius 1/2 that rises from a plane: curvatures 2 and 0, up to the crease."""
     (surface,) = components_of(*tunnel_on_a_plane(), SHARP)
-    directions, rings = surface.directions("auto")
-    assert rings == 2
+    directions, fitted = surface.directions("auto")
+    assert fitted.rings == 2
     flat = np.abs(surface.frames.normals[:, 2]) > 1 - 1e-9
     flat &= np.abs(surface.frames.centres[:, 0]) > 0.5
     assert np.abs(directions.values[flat]).max() < 1e-6

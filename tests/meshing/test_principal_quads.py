@@ -16,10 +16,12 @@ from torchfair import MeshError, Topology, load_mesh, save_mesh
 from torchfair.errors import SettingsError, ShapeError, TorchfairError
 from torchfair.geometry import ReferenceSurface, face_areas, face_normals
 from torchfair.meshing import MeshingSettings, NoMeshError, QuadMesh, principal_quads
+from torchfair.meshing.components import read_surface
 from torchfair.meshing.verification import shape_of, verified_topology
 from torchfair.shapes import (
     Catenoid,
     Cylinder,
+    Enneper,
     FreeFormPatch,
     PrincipalParaboloid,
     Sphere,
@@ -79,6 +81,24 @@ def test_edges_follow_exact_directions(surface: Surface, count: int) -> None:
     assert found.report["angle_mean_degrees"] < 1
     assert found.report["angle_95_degrees"] < 3
     assert found.report["planarity_mean"] < 0.006
+
+
+@pytest.mark.parametrize(
+    "surface", [Cylinder(), Enneper(), Torus(tube_angles=(1.6, 4.7))], ids=lambda s: type(s).__name__
+)
+def test_the_curvature_that_energy_is_measured_against_reaches_up_to_the_boundary(surface: Surface) -> None:
+    """That of the triangles is 10 % too large on the cylinder, and 1 and 4 % too small on the others."""
+    mesh = irregular_triangles(surface, 1000)
+    found = read_surface(mesh.vertices, mesh.topology, MeshingSettings())
+    assert found.total_absolute_curvature == pytest.approx(surface.total_absolute_curvature(), rel=0.007)
+
+
+def test_creases_count_with_their_energy() -> None:
+    """A folded strip has no other curvature."""
+    vertices = torch.tensor([[0.0, 0, 0], [1, 0, 0], [1, 2, 0], [0, 2, 0], [0, 0, 1], [0, 2, 1]], dtype=torch.float64)
+    faces = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [4, 3, 5]]
+    found = read_surface(vertices, Topology.from_faces(faces), MeshingSettings())
+    assert found.total_absolute_curvature == pytest.approx(2 * 2 * math.sin(math.pi / 4))
 
 
 def test_energy_is_the_total_absolute_curvature() -> None:

@@ -53,6 +53,34 @@ def test_the_last_line_is_not_repeated() -> None:
     assert [line.split()[1] for line in stream.flushed.splitlines()] == ["0/60", "5/60", "10/60"]
 
 
+class Closed(io.StringIO):
+    """A terminal that is gone."""
+
+    def __init__(self, *, terminal: bool) -> None:
+        super().__init__()
+        self.terminal, self.open = terminal, True
+
+    def isatty(self) -> bool:
+        return self.terminal
+
+    def write(self, text: str) -> int:
+        if not self.open:
+            raise OSError(5, "Input/output error")
+        return super().write(text)
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_work_goes_on_where_nobody_can_look_any_more(terminal: bool) -> None:
+    stream = Closed(terminal=terminal)
+    with ProgressDisplay(3, stream=stream, every=1) as display:
+        display(Step(0))
+        stream.open = False
+        display._repainted = -math.inf
+        display(Step(1, elapsed=1.0))
+        display(Step(2, elapsed=2.0))
+    assert "1/3" not in stream.getvalue()
+
+
 def test_about_twenty_plain_lines_by_default() -> None:
     for iterations in (20, 60, 1000):
         stream = Flushing()

@@ -47,3 +47,22 @@ def positive_or_none(text: str) -> float | None:
     if value == 0.0:
         raise argparse.ArgumentTypeError("expected a number above 0, or none")
     return value
+
+
+def finite(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a finite number, got {text!r}")
+    return value
+
+
+def degrees(text: str) -> float:
+    """An angle in degrees, from 0 to 180."""
+    value = non_negative(text)
+    if value > 180.0:
+        raise argparse.ArgumentTypeError(f"expected degrees from 0 to 180, got {text!r}")
+    return value

@@ -6,14 +6,17 @@ import argparse
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TextIO
 
-from ..errors import TorchfairError
+from .._interrupts import ended_like_ctrl_c
 from . import denoise, design, diagnose, fair, form, measure, mesh, reflect, subdivide, symmetric
 from .errors import CommandError
-from .exit_codes import EXIT_BROKEN_PIPE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_OK, IN_WORDS
+from .exit_codes import EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, EXIT_OK, EXIT_SIGNAL, IN_WORDS
+from .outcomes import outcome_of
 from .parser import CommandParser
+from .several import run_inputs
+from .tellers import json_or_plain
 
 _JOBS = (fair.COMMAND, form.COMMAND, symmetric.COMMAND, denoise.COMMAND)
 _COMMANDS = (measure, diagnose, reflect, *_JOBS, mesh, subdivide, design)
@@ -34,38 +37,47 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs ``torchfair`` with the given arguments (by default those of the process) and returns the exit code.
 
     Errors that the user can mend (wrong options, :class:`~torchfair.TorchfairError`, files that cannot be read
-    or written) end as exactly one line on stderr and exit code 2. Interruption gives 130; a reader that goes
-    away, as in ``torchfair measure x.obj | head -1``, gives 141 without any message.
+    or written) end as exactly one line on stderr and exit code 2. Ctrl-C gives 130, SIGTERM and SIGHUP, which do the
+    same, 143 and 129; a reader that goes away, as in ``torchfair measure x.obj | head -1``, gives 141 without any
+    message.
     """
-    name = "torchfair"
+    parsed: list[argparse.Namespace] = []
+    code = guarded(lambda: _parse(argv, parsed), "torchfair")
+    return guarded(lambda: _run(parsed[0]), parsed[0].name) if parsed else code
+
+
+def guarded(run: Callable[[], int], name: str) -> int:
+    """Runs a command; its exit code, with one line on stderr if something went wrong."""
+
+    def flushed() -> int:
+        code = run()
+        sys.stdout.flush()
+        return code
+
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # file names may hold anything
     try:
-        parser = build_parser()
-        arguments, unknown = parser.parse_known_args(argv)
-        name = getattr(arguments, "name", name)
-        code = _run(parser, arguments, unknown, name)
-        sys.stdout.flush()
-        return code
+        with ended_like_ctrl_c() as handler:
+            outcome = outcome_of(flushed, name)
     except BrokenPipeError:
         _abandon_broken(sys.stdout)
         _abandon_broken(sys.stderr)
         return EXIT_BROKEN_PIPE
-    except KeyboardInterrupt:
-        return _fail(f"{name}: interrupted", EXIT_INTERRUPTED)
-    except SystemExit as stop:  # argparse, after printing help
-        return stop.code if isinstance(stop.code, int) else EXIT_OK
-    except CommandError as error:
-        return _fail(f"{error.name or name}: error: {error}", EXIT_ERROR)
-    except TorchfairError as error:
-        return _fail(f"{name}: error: {error}", EXIT_ERROR)
-    except OSError as error:
-        place = f"{error.filename}: " if error.filename is not None else ""
-        return _fail(f"{name}: error: {place}{error.strerror or error}", EXIT_ERROR)
+    try:
+        print(outcome.line, end="\n" * bool(outcome.line), file=sys.stderr, flush=True)
+    except OSError:
+        _abandon_broken(sys.stderr)
+    if outcome.code == EXIT_INTERRUPTED and handler.number is not None:
+        return EXIT_SIGNAL + handler.number
+    return outcome.code
 
 
-def _run(parser: CommandParser, arguments: argparse.Namespace, unknown: list[str], name: str) -> int:
+def _parse(argv: Sequence[str] | None, parsed: list[argparse.Namespace]) -> int:
+    """Adds arguments of a command that is to be run, if there is one, to ``parsed``."""
+    parser = build_parser()
+    arguments, unknown = parser.parse_known_args(argv)
     if unknown:  # argparse would name the parser of all commands here
+        name = getattr(arguments, "name", "torchfair")
         raise CommandError(f"unrecognized arguments: {' '.join(unknown)} ({name} --help lists the options)", name)
     if arguments.version:
         from .. import __version__
@@ -74,16 +86,14 @@ def _run(parser: CommandParser, arguments: argparse.Namespace, unknown: list[str
         return EXIT_OK
     if not hasattr(arguments, "run"):
         parser.error("a command is needed")
+    parsed.append(arguments)
+    return EXIT_OK
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    if isinstance(getattr(arguments, "input", None), list):
+        return run_inputs(arguments, getattr(arguments, "teller", json_or_plain))
     return int(arguments.run(arguments))
-
-
-def _fail(message: str, code: int) -> int:
-    """Prints ``message`` as one line on stderr, as far as anyone listens."""
-    try:
-        print(" ".join(message.split()), file=sys.stderr, flush=True)
-    except OSError:
-        _abandon_broken(sys.stderr)
-    return code
 
 
 def _abandon_broken(stream: TextIO) -> None:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from .inputs import add_repair, read_input
 from .job_command import JobCommand
-from .outputs import Request, Writer
 from .pictures import draw_before_after
+from .request import Request, Writer
+from .several import add_inputs
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
@@ -41,7 +42,7 @@ class DenoiseCommand(JobCommand):
 
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh."""
-        parser.add_argument("input", metavar="INPUT", help="mesh file, or a built-in example:NAME")
+        add_inputs(parser, "mesh file, or a built-in example:NAME")
         add_repair(parser)
 
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:

@@ -12,6 +12,7 @@ from .chosen_vertices import NUMBERS, ChosenVertices
 from .errors import CommandError
 from .inputs import add_repair, read_input
 from .reading import said_of
+from .several import add_inputs
 from .told_files import told_files, written_with_report
 
 if TYPE_CHECKING:
@@ -54,8 +55,9 @@ def add_parser(subparsers: Any) -> None:
         "diagnose", help="find bad saddles and folded normals", description=_DESCRIPTION, allow_abbrev=False
     )
     add = parser.add_argument
-    add("input", metavar="INPUT", help="mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh), or example:roof")
-    add("--json", action="store_true", help="print one JSON object instead of tables")
+    add_inputs(parser, "mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh), or example:roof")
+    add("--json", action="store_true", help="print one JSON object instead of tables, a line for each of several "
+        "inputs")  # fmt: skip
     add("--per-vertex", action="store_true", help="with --json or --output: list the class of every vertex")
     add("--worst", type=count, default=10, metavar="N", help="list the N worst vertices (default 10)")
     add(
@@ -66,7 +68,7 @@ def add_parser(subparsers: Any) -> None:
     add("--no-pictures", action="store_true", help="write no pictures")
     add("--force", action="store_true", help="replace files that exist")
     add_repair(parser)
-    parser.set_defaults(run=run, name=NAME)
+    parser.set_defaults(run=run, name=NAME, output_is_folder=True)
 
 
 def run(arguments: argparse.Namespace) -> int:

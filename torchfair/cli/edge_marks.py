@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import MeshFileError
-from .outputs import Outputs, Request
+from .outputs import Outputs
+from .request import Request
 
 if TYPE_CHECKING:
     import argparse
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from ..io import PolygonMesh
     from ..subdivision import Refinement
     from ..topology import Topology
-    from .outputs import Report, Writer
+    from .request import Report, Writer
 
 
 def marks_file(arguments: argparse.Namespace) -> Path | None:

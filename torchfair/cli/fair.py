@@ -22,8 +22,9 @@ from .inputs import (
     read_reference,
 )
 from .job_command import JobCommand
-from .outputs import Request, Writer
 from .pictures import draw_before_after
+from .request import Request, Writer
+from .several import add_inputs
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
@@ -76,7 +77,7 @@ class FairCommand(JobCommand):
 
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh, a surface to stay close to, handles, and vertices that stay."""
-        parser.add_argument("input", metavar="INPUT", help="mesh file, or example:roof or example:hybrid_roof")
+        add_inputs(parser, "mesh file, or example:roof or example:hybrid_roof")
         add_reference(parser, "stay close to this surface instead of the input")
         add_levels(parser)
         add_handles(parser)

@@ -7,14 +7,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from .arguments import positive_count
+from .arguments import finite, positive_count
 from .chosen_vertices import ChosenVertices
 from .form_inputs import read_form_input
 from .form_mesh import FormOutputs, add_mesh
 from .inputs import add_handles, add_levels, add_repair, read_handles
 from .job_command import JobCommand
-from .outputs import Request, Writer
 from .pictures import draw_edges
+from .request import Request, Writer
+from .several import add_inputs
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
@@ -57,8 +58,8 @@ class FormCommand(JobCommand):
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh or curves, and points to pass through."""
         add = parser.add_argument
-        add("input", metavar="INPUT", nargs="?", help="mesh file to start from, or a built-in example:NAME; left out, "
-            "a start is made from the curves")  # fmt: skip
+        words = "mesh file to start from, or a built-in example:NAME; left out, a start is made from the curves"
+        add_inputs(parser, words, needed=False)
         add("--curve", action="append", default=[], metavar="FILE", help="closed boundary curve: a text file with x y "
             "z, or x y z and a normal, in every line; or the curves of an OBJ (line elements), DXF or 3DM file; one "
             "curve for a disk, two for an annulus, more for more holes; repeatable")  # fmt: skip
@@ -69,7 +70,7 @@ class FormCommand(JobCommand):
             "vertices have other numbers then; always done without a mesh to start from")  # fmt: skip
         add("--vertices", type=positive_count, default=1000, metavar="N", help="size of a start made from curves "
             "(default 1000)")  # fmt: skip
-        add("--through", nargs=3, action="append", default=[], type=float, metavar=("X", "Y", "Z"),
+        add("--through", nargs=3, action="append", default=[], type=finite, metavar=("X", "Y", "Z"),
             help="a point to pass through: pulls the nearest inner vertex of the start; repeatable")  # fmt: skip
         add_levels(parser)
         add_mesh(parser)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from .arguments import positive_count
 from .mesh import draw_singular, table
-from .outputs import Outputs, Request, Writer
+from .outputs import Outputs
+from .request import Request, Writer
 from .result_files import save_result
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ class FormOutputs(Outputs):
         from ..meshing import principal_quads
         from ..projection import Status
 
-        if result.projection.status is Status.INTERRUPTED:
+        if request.interrupted or result.projection.status is Status.INTERRUPTED:
             return "interrupted before"
         try:
             self._made = made = principal_quads(result.vertices, result.topology, count=count)

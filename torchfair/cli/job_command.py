@@ -8,12 +8,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from .._interrupts import deferred_interrupts
 from .._names import FROM_ZERO
 from .exit_codes import IN_WORDS, exit_code
 from .options import SettingOptions
-from .outputs import Outputs, Request, Writer, add_outputs, asked_for
+from .outputs import Outputs, add_outputs, asked_for
 from .parser import CommandParser
 from .reading import in_numbers_of, read_report
+from .request import Request, Writer
 from .summary import kept_lines, measures_table, missed_lines, note_lines, work_lines
 
 if TYPE_CHECKING:
@@ -80,7 +82,7 @@ class JobCommand(ABC):
             allow_abbrev=False,
             fill=self._fill,
         )
-        parser.set_defaults(run=self.run, name=self.name)
+        parser.set_defaults(run=self.run, check=self.check, name=self.name)
 
     def _fill(self, parser: CommandParser) -> None:
         self.add_inputs(parser)
@@ -90,6 +92,10 @@ class JobCommand(ABC):
     def options(self) -> SettingOptions[Any]:
         """The options that are settings."""
         return SettingOptions(self.settings(), self.job, self.option_names)
+
+    def check(self, arguments: argparse.Namespace) -> None:
+        """Refuses settings that no input can have."""
+        self.options().settings(arguments)
 
     def run(self, arguments: argparse.Namespace) -> int:
         """Checks everything that can be checked first, then solves, then writes; the exit code."""
@@ -102,9 +108,17 @@ class JobCommand(ABC):
         for warning in request.warnings:
             print(f"{self.name}: warning: {warning}", file=sys.stderr, flush=True)
         mesh = request.mesh
-        with in_numbers_of(mesh):
-            result = self._solve(request, settings)
-        outputs.save(request, result, lambda: self._report(arguments, request, result, settings))
+        solve = self._solver(request, settings, quiet=getattr(arguments, "quiet", False))
+
+        def report() -> dict[str, Any]:
+            return self._report(arguments, request, result, settings)
+
+        with deferred_interrupts() as interrupts:  # from the first step to the file nothing is lost
+            with in_numbers_of(mesh):
+                result = solve()
+            outputs.save(request, result, report)
+            request.interrupted = interrupts.pending
+        outputs.save_more(request, result, report)
         levels = getattr(arguments, "levels", 0)
         names = mesh.names if len(result.levels) == 1 else FROM_ZERO  # finer meshes have their own numbers
         missed = [*missed_lines(result, levels, names), *request.missed]
@@ -119,12 +133,17 @@ class JobCommand(ABC):
         outputs.finish(request, result, lines, missed)
         return exit_code(result.projection.status, missed, interrupted=request.interrupted)
 
-    def _solve(self, request: Request, settings: Any) -> JobResult[Any]:
+    def _solver(self, request: Request, settings: Any, *, quiet: bool) -> Callable[[], JobResult[Any]]:
+        """Does the job; all that it needs is loaded."""
         from ..progress import ProgressDisplay
 
         job, start = self.function(), request.start or (request.mesh.vertices, request.mesh.topology)
-        with ProgressDisplay(self.most_steps(settings)) as display:
-            return job(*start, **request.options, settings=settings, callback=display)
+
+        def solve() -> JobResult[Any]:
+            with ProgressDisplay(self.most_steps(settings)) as display:
+                return job(*start, **request.options, settings=settings, callback=None if quiet else display)
+
+        return solve
 
     def _report(
         self, arguments: argparse.Namespace, request: Request, result: JobResult[Any], settings: Any

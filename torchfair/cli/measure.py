@@ -10,6 +10,8 @@ from .arguments import count
 from .errors import CommandError
 from .inputs import add_reference, add_repair, read_input, read_reference
 from .reading import said_of
+from .several import Teller, add_inputs
+from .tellers import JsonLines, Rows
 
 if TYPE_CHECKING:
     from ..measuring import EdgeMeasures, Quantity
@@ -60,6 +62,19 @@ _LABELS = {
     "tangential_imbalance": "imbalance (sum of these / sum of l* around vertices)",
     "largest_reference_distance": "largest distance from the reference",
 }
+_COLUMNS = {
+    "vertices": "vertices",
+    "faces": "faces",
+    "normal_variation": "E",
+    "total_absolute_curvature": "C",
+    "angle_variation": "E'",
+    "area": "area",
+    "mean_edge_length": "mean edge",
+    "smallest_corner_angle_degrees": "smallest angle",
+    "largest_dihedral_angle_degrees": "largest |a|",
+    "largest_planarity": "planarity",
+}
+"""Of the table of several meshes."""
 _NAME = 25  # columns of a label before its formula
 
 
@@ -68,17 +83,25 @@ def add_parser(subparsers: Any) -> None:
     parser: argparse.ArgumentParser = subparsers.add_parser(
         "measure", help="print the smoothness of a mesh", description=_DESCRIPTION, allow_abbrev=False
     )
-    parser.add_argument(
-        "input", metavar="INPUT", help="mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh), or example:roof"
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object instead of tables")
+    add_inputs(parser, "mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh), or example:roof")
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true", help="print one JSON object instead of tables, a line for each of "
+        "several inputs")  # fmt: skip
+    form.add_argument("--csv", action="store_true", help="print comma-separated values, a row for each input")
     parser.add_argument("--worst", type=count, default=10, metavar="N", help="list the N worst edges (default 10)")
     add_reference(parser, "surface on which vertices may move: measure how far E is from being stationary there")
     parser.add_argument(
         "--per-vertex", action="store_true", help="with --json and --reference: lists with an entry for every vertex"
     )
     add_repair(parser)
-    parser.set_defaults(run=run, name=NAME)
+    parser.set_defaults(run=run, name=NAME, teller=_teller)
+
+
+def _teller(arguments: argparse.Namespace) -> Teller:
+    """Several meshes in a table, in full as CSV or JSON."""
+    if arguments.json:
+        return JsonLines()
+    return Rows(_LABELS if arguments.csv else _COLUMNS, as_csv=arguments.csv)
 
 
 def run(arguments: argparse.Namespace) -> int:

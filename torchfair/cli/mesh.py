@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._interrupts import deferred_interrupts
 from .arguments import positive_count
 from .edge_marks import end_of_marks
 from .errors import CommandError
@@ -15,9 +16,11 @@ from .exit_codes import IN_WORDS, exit_code
 from .inputs import add_repair, read_input
 from .mesh_planar import made_planar
 from .options import SettingOptions
-from .outputs import Outputs, Request, Writer, add_outputs, asked_for
+from .outputs import Outputs, add_outputs, asked_for
 from .parser import CommandParser
 from .reading import in_numbers_of, read_report
+from .request import Request, Writer
+from .several import add_inputs
 from .summary import note_lines
 
 if TYPE_CHECKING:
@@ -34,6 +37,7 @@ _DESCRIPTION = (
     "them and the boundary follows a direction becomes lines of the mesh. The topology is that of the surface, or "
     "nothing is written."
 )
+_SHORTEST = 0.02  # edge of a mesh, in mean edges
 _ROWS = {
     "faces": "faces",
     "quads": "  quads among them",
@@ -45,6 +49,8 @@ _ROWS = {
     "total_absolute_curvature": "C of the surface",
     "variation_over_curvature": "E/C",
     "distance_max": "largest distance from the surface, in mean edges",
+    "shortest_edge": "shortest edge, in mean edges",
+    "smallest_angle_degrees": "smallest angle of a corner, degrees",
     "spacing_shortest": "shortest spacing asked for",
     "spacing_longest": "longest ...",
     "range_share": "share of the surface at the ends of the range",
@@ -65,13 +71,13 @@ def add_parser(subparsers: Any) -> None:
         allow_abbrev=False,
         fill=fill,
     )
-    parser.set_defaults(run=run, name=NAME)
+    parser.set_defaults(run=run, check=check, name=NAME)
 
 
 def fill(parser: CommandParser) -> None:
     """Adds the arguments."""
     add = parser.add_argument
-    add("input", metavar="INPUT", help="mesh file of a surface, or a built-in example:NAME")
+    add_inputs(parser, "mesh file of a surface, or a built-in example:NAME")
     add_repair(parser)
     add("--quads", type=positive_count, metavar="N", help="about so many quads")
     add("--triangles", type=positive_count, metavar="N", help="about so many triangles, with principal edges")
@@ -88,13 +94,18 @@ def options() -> SettingOptions[MeshingSettings]:
     return SettingOptions(MeshingSettings, "mesh", {})
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Checks what can be checked first, then reads, meshes, writes and prints."""
+def check(arguments: argparse.Namespace) -> MeshingSettings:
+    """The settings; refuses what no input can have."""
     if (arguments.quads is None) == (arguments.triangles is None):
         raise CommandError("give one of --quads N and --triangles N")
     if arguments.planar and arguments.triangles:
         raise CommandError("--planar is for --quads: triangles are planar")
-    settings = options().settings(arguments)
+    return options().settings(arguments)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Checks what can be checked first, then reads, meshes, writes and prints."""
+    settings = check(arguments)
     outputs = MeshOutputs(arguments, {"mesh.png": draw_singular, "edges.png": _edges})
     outputs.prepare()
     surface = read_input(arguments.input, arguments)
@@ -102,13 +113,15 @@ def run(arguments: argparse.Namespace) -> int:
     began = time.perf_counter()
     with in_numbers_of(surface):
         made = _made(surface, arguments, settings)
-    missed: list[str] = []
-    status = None
-    if arguments.planar:
-        made, missed, status = made_planar(made, surface)
-    request, seconds = Request(surface, {}), time.perf_counter() - began
-    report = _report(arguments, made, settings, missed, seconds) | read_report(surface)
-    outputs.save(request, made, lambda: report)
+    not_planar: list[str] = []
+    status, request = None, Request(surface, {})
+    with deferred_interrupts() as interrupts:
+        if arguments.planar:
+            made, not_planar, status = made_planar(made, surface, quiet=getattr(arguments, "quiet", False))
+        missed = [*not_planar, *too_short(made)]
+        report = _report(arguments, made, settings, missed, time.perf_counter() - began) | read_report(surface)
+        outputs.save(request, made, lambda: report)
+        request.interrupted = interrupts.pending
     notes = [*surface.notes, *made.notes, *request.notes]
     lines = [*note_lines(surface.repairs, notes, missed), *table(made.report)]
     outputs.finish(request, made, lines, missed)
@@ -121,6 +134,16 @@ def _made(surface: PolygonMesh, arguments: argparse.Namespace, settings: Meshing
     if arguments.triangles:
         return principal_triangles(surface.vertices, surface.topology, count=arguments.triangles, settings=settings)
     return principal_quads(surface.vertices, surface.topology, count=arguments.quads, settings=settings)
+
+
+def too_short(made: Made) -> list[str]:
+    """The promise of the shortest edge, where it is not kept."""
+    from ..formfinding import Promise
+
+    remedy = "corners of the boundary or of creases that close stay: ask for more faces, or raise --corner-angle"
+    reached = made.report["shortest_edge"]
+    promise = Promise("shortest edge", _SHORTEST, reached, "at least", "mean edges", remedy=remedy)
+    return [] if promise.holds else [str(promise)]
 
 
 class MeshOutputs(Outputs):

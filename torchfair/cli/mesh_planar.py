@@ -26,13 +26,13 @@ class PlanarMesh(NamedTuple):
     status: Status
 
 
-def made_planar(mesh: QuadMesh, surface: PolygonMesh) -> PlanarMesh:
+def made_planar(mesh: QuadMesh, surface: PolygonMesh, *, quiet: bool) -> PlanarMesh:
     """The mesh with planar polygons near the surface. Ctrl-C ends the solve, not the command: the best mesh is kept."""
     with deferred_interrupts():
         from ..formfinding import PLANAR_QUADS, planar_quads
         from ..progress import ProgressDisplay
 
         with ProgressDisplay(PLANAR_QUADS.projection.max_iterations) as display:
-            made, job = planar_quads(mesh, (surface.vertices, surface.topology), callback=display)
+            made, job = planar_quads(mesh, (surface.vertices, surface.topology), callback=None if quiet else display)
     missed = [str(promise) for promise in job.promises if not promise.holds]
     return PlanarMesh(made, missed, job.projection.status)

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._interrupts import deferred_interrupts
 from ..errors import TorchfairError
 from .elsewhere import places
 from .errors import CommandError
 from .output_checks import make_folders, refuse_report_of_another, refuse_taken, refuse_unknown_format, remove
 from .output_names import FILES, OutputNames, listed, listed_in
+from .request import Report, Request, Writer
 from .result_files import save_result
 
 if TYPE_CHECKING:
@@ -22,44 +21,9 @@ if TYPE_CHECKING:
 
     from ..io import PolygonMesh
 
-_NOT_ASKED = ("run", "name", "version")
+_NOT_ASKED = ("run", "check", "name", "version", "quiet")
 _BYTES = 200  # of a vertex and its faces as text, about
 _BYTES_OF_OTHERS = 1_000_000  # of a report or a picture
-
-
-@dataclass
-class Request:
-    """What a job is to do.
-
-    Attributes:
-        mesh: Where it starts.
-        options: Arguments of the function that does it, by name, beside settings and callback.
-        start: Its first arguments; by default vertices and topology of the mesh.
-        notes: What was decided while reading, in words.
-        warnings: What is likely to fail, and what to do instead; said before it is tried.
-        marks: Marked edges (E,) of the mesh, which go with it; None for none.
-        settings: To solve with; by default those that options ask for.
-        report: Entries of the report beside those that all jobs have.
-        missed: What was asked for beside the job and is not there, in words.
-        interrupted: Whether what comes after the job was interrupted.
-    """
-
-    mesh: PolygonMesh
-    options: dict[str, Any]
-    start: Sequence[Any] = ()
-    notes: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    settings: Any = None
-    marks: Tensor | None = None
-    report: dict[str, Any] = field(default_factory=dict)
-    missed: list[str] = field(default_factory=list)
-    interrupted: bool = False
-
-
-Writer = Callable[[Path, Any, Any, bool], object]
-"""Writes one file from its path, the request, the result, and whether it may replace a file."""
-Report = Callable[[], Mapping[str, Any]]
-"""Makes the entries of a report."""
 
 
 class Outputs:
@@ -122,11 +86,16 @@ class Outputs:
     # ---- after it --------------------------------------------------------------------------------------
 
     def save(self, request: Request, result: Any, report: Report) -> None:
-        """Writes what must not be lost, then makes more and writes that with the report; Ctrl-C waits meanwhile."""
-        with deferred_interrupts():
-            self._keep(request, result, report)
-        if self.more(request, result):
-            self._attempt(partial(self._together, self.late, request, result, report), self.report)
+        """Writes what must not be lost; to be called where Ctrl-C waits."""
+        self._keep(request, result, report)
+
+    def save_more(self, request: Request, result: Any, report: Report) -> None:
+        """Makes what takes long and writes it, with the report anew."""
+        try:
+            if self.more(request, result):
+                self._attempt(partial(self._together, self.late, request, result, report), self.report)
+        except KeyboardInterrupt:
+            request.interrupted = True
 
     def more(self, request: Request, result: Any) -> bool:
         """Makes what takes long once the mesh is safe; whether the report has to be written anew."""
@@ -149,6 +118,8 @@ class Outputs:
         print("\n".join(lines), flush=True)
         rest = {self.names.side(end): writer for end, writer in (self.pictures | self.others).items()}
         try:
+            if request.interrupted:
+                raise KeyboardInterrupt
             for path, writer in rest.items():
                 self._attempt(partial(writer, path, request, result, self.force), path)
         except KeyboardInterrupt:
@@ -225,8 +196,8 @@ def _words(error: Exception) -> str:
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Adds the options that say where they go."""
     add = parser.add_argument
-    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM); "
-        "what belongs to it is named after it: NAME.report.json and others")  # fmt: skip
+    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM), "
+        "or a folder; what belongs to it is named after it: NAME.report.json and others")  # fmt: skip
     add("--results", metavar="FOLDER", help="folder of NAME.report.json and all else (default: that of OUTPUT)")
     add("--no-pictures", action="store_true", help="write no pictures")
     add("--force", action="store_true", help="replace files that exist, and remove pictures of the earlier run")

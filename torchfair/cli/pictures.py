@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .outputs import Request
+from .request import Request
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level

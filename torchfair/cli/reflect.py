@@ -12,6 +12,7 @@ from .errors import CommandError
 from .exit_codes import EXIT_NOT_REACHED, EXIT_OK
 from .inputs import add_repair, read_input
 from .reading import said_of
+from .several import add_inputs
 from .told_files import told_files, written_with_report
 
 if TYPE_CHECKING:
@@ -47,10 +48,11 @@ def add_parser(subparsers: Any) -> None:
         "reflect", help="judge a mesh by its reflections", description=_DESCRIPTION, allow_abbrev=False
     )
     add = parser.add_argument
-    add("input", metavar="INPUT", help="mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh), or example:roof")
+    add_inputs(parser, "mesh file (OBJ, OFF, PLY; STL, GLB, ... through trimesh), or example:roof")
     add("--reference", metavar="FILE", help="smooth surface to compare with: a fine mesh, mirrored with its vertex "
         "normals (default: the input itself)")  # fmt: skip
-    add("--json", action="store_true", help="print one JSON object instead of a table")
+    add("--json", action="store_true", help="print one JSON object instead of a table, a line for each of several "
+        "inputs")  # fmt: skip
     add("-o", "--output", metavar="FOLDER", help=f"folder for NAME.{REPORT}, pictures and a turntable; nothing is "
         "written without it")  # fmt: skip
     add("--size", type=positive_count, default=256, metavar="PIXELS", help="pixels along a picture (default 256)")
@@ -60,7 +62,7 @@ def add_parser(subparsers: Any) -> None:
     add("--no-pictures", action="store_true", help="write no pictures and no turntable")
     add("--force", action="store_true", help="replace files that exist")
     add_repair(parser)
-    parser.set_defaults(run=run, name=NAME)
+    parser.set_defaults(run=run, name=NAME, output_is_folder=True)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .arguments import non_negative
 from .errors import CommandError
-from .outputs import Request, Writer
+from .request import Request, Writer
 
 if TYPE_CHECKING:
     from torch import Tensor

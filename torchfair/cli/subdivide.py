@@ -7,13 +7,14 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import non_negative, positive_count
+from .arguments import degrees, positive_count
 from .edge_marks import carried, end_of_marks, read_marks
 from .inputs import add_repair, read_input
 from .output_checks import make_folders, refuse_taken, refuse_unknown_format
 from .output_names import OutputNames
 from .reading import in_numbers_of, said_of
 from .result_files import save_result
+from .several import add_inputs
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -38,14 +39,15 @@ def add_parser(subparsers: Any) -> None:
         "subdivide", help="refine a mesh", description=_DESCRIPTION, allow_abbrev=False
     )
     add = parser.add_argument
-    add("input", metavar="INPUT", help="mesh file, or a built-in example:NAME")
-    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF or PLY)")
+    add_inputs(parser, "mesh file, or a built-in example:NAME")
+    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF, PLY, "
+        "STL, GLB or 3DM), or a folder")  # fmt: skip
     add("--scheme", choices=_SCHEMES, default="hybrid", help="loop for triangles; catmull-clark; hybrid, which is loop "
         "on triangles and catmull-clark on other faces; or midpoint, which moves nothing (default hybrid)")  # fmt: skip
     add("--levels", type=positive_count, default=1, metavar="N", help="how often (default 1)")
     add("--boundary", choices=("curve", "interpolate", "polyline"), default="curve", help="smooth the boundary, pass "
         "through its vertices, or keep its edges straight (default curve)")  # fmt: skip
-    add("--corner-angle", type=non_negative, default=40.0, metavar="DEGREES", help="boundary vertices where it turns "
+    add("--corner-angle", type=degrees, default=40.0, metavar="DEGREES", help="boundary vertices where it turns "
         "by more than this stay (default 40)")  # fmt: skip
     add("--labels", metavar="FILE", help="OBJ or JSON file that marks edges (default: INPUT if it marks any)")
     add("--lines", choices=("auto", "parallel", "along"), default="auto", help="mark parts of marked edges alone "

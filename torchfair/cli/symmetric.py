@@ -23,10 +23,12 @@ from .inputs import (
     read_reference,
 )
 from .job_command import JobCommand
-from .outputs import Outputs, Request, Writer
+from .outputs import Outputs
 from .pictures import draw_edges
 from .reading import in_numbers_of
+from .request import Request, Writer
 from .result_files import not_held
+from .several import add_inputs
 from .strips import StripFiles, add_strips
 from .symmetric_inputs import add_labels, polyline_vertices, read_principal_edges, slide_warnings, vertex_mask
 from .symmetric_quads import even_settings, read_quads
@@ -80,11 +82,7 @@ class SymmetricCommand(JobCommand):
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh with principal edges, handles, a reference, and strips to make."""
         add = parser.add_argument
-        add(
-            "input",
-            metavar="INPUT",
-            help="triangle or quad mesh, or a built-in example:NAME; quads are cut by diagonals",
-        )
+        add_inputs(parser, "triangle or quad mesh, or a built-in example:NAME; quads are cut by diagonals")
         add_labels(parser)
         add_handles(parser)
         add_fixed(parser)

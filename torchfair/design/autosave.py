@@ -7,8 +7,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from .._atomic import atomic_write_bytes
 from ..errors import MeshFileError
-from ..io import atomic_write_bytes
 from .session_file import KEPT
 
 _PAUSE = 3.0  # seconds between two of them

@@ -96,6 +96,7 @@ class Core:
         self.worst, self.began = 8, clock()
         self.saved: Document | None = None
         self.told: set[str] = set()
+        self.examples: tuple[str, ...] = ()
         self._lost: list[float] = []
 
     # ---- what it is ------------------------------------------------------------------------------------
@@ -142,6 +143,12 @@ class Core:
         """Says what all windows together want to see."""
         views = tuple(dict.fromkeys(view for views in self.windows.values() for view in views))
         return Ask(r.Watch(self.serial, views, self.worst))
+
+    def files_message(self) -> dict[str, Any]:
+        """What can be opened; examples are known once the engine is there."""
+        examples = [{"name": f"example:{name}", "words": name.replace("_", " ")} for name in self.examples]
+        folder = self.folder
+        return {"type": "files", "folder": folder.path.name, "files": folder.listing(), "examples": examples}
 
     def ask(self, sentence: str, choices: Iterable[tuple[str, str]]) -> list[Effect]:
         """Asks all windows; :attr:`pending` says what it is about."""

@@ -38,7 +38,8 @@ def heard(core: Core, event: r.Event) -> list[Effect]:
 
 
 def _started(core: Core, event: r.Started) -> list[Effect]:
-    effects: list[Effect] = [core.watch()]
+    new, core.examples = event.examples != core.examples, event.examples
+    effects: list[Effect] = [core.watch(), *([Tell(core.files_message())] if new else [])]
     if core.paused:
         effects.append(Ask(r.Pause(core.serial, True)))
     if core.state is not S.LOST:

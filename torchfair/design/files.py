@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..io import atomic_write_bytes
+from .._atomic import atomic_write_bytes
 from .commands import Command, CommandRefused
 from .containers import pack, unpack
 from .effects import Deliver, Store

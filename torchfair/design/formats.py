@@ -1,11 +1,10 @@
-"""Formats that a design is saved in, and examples that it begins with."""
+"""Formats that a design is saved in."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from ..shapes import EXAMPLES, SURFACES
 from .session_file import SUFFIX
 
 SESSION = "session"
@@ -25,8 +24,3 @@ FORMATS: Mapping[str, tuple[str, str, str]] = {
 def formats_message() -> list[dict[str, Any]]:
     """All of them, for the page."""
     return [{"format": name, "suffix": suffix, "words": words} for name, (suffix, words, _) in FORMATS.items()]
-
-
-def examples() -> list[dict[str, str]]:
-    """What can be opened without any file, for the page."""
-    return [{"name": f"example:{name}", "words": name.replace("_", " ")} for name in [*EXAMPLES, *SURFACES]]

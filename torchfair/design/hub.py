@@ -13,7 +13,6 @@ from .autosave import Keeper
 from .commands import CommandRefused, read_command
 from .containers import frame
 from .effects import Ask, Autosave, Deliver, Draw, Effect, StartEngine, Store, Tell, Wake
-from .engine.process import EngineProcess
 from .engine.requests import Event, Open, Request, Shown
 from .files import download_message, store, upload_command
 from .session import DesignSession
@@ -60,14 +59,14 @@ class Hub:
     Args:
         session: The design.
         keeper: Of what is not saved.
-        make_engine: By default a child process.
+        make_engine: Starts what computes.
 
     Attributes:
         session: The design.
         engine: What computes now; None before :meth:`start`.
     """
 
-    def __init__(self, session: DesignSession, keeper: Keeper, make_engine: MakeEngine = EngineProcess) -> None:
+    def __init__(self, session: DesignSession, keeper: Keeper, make_engine: MakeEngine) -> None:
         self.session, self._keeper, self._make_engine = session, keeper, make_engine
         self.engine: Engine | None = None
         self._windows: dict[int, Window] = {}

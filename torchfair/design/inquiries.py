@@ -12,7 +12,7 @@ from .core import Core
 from .edits import Handler
 from .effects import Autosave, Deliver, Effect, Store, Tell
 from .engine import requests as r
-from .formats import FORMATS, SESSION, examples
+from .formats import FORMATS, SESSION
 from .questions import FILE, KEPT, REPAIRS
 from .session_file import session_bytes
 from .states import DesignState
@@ -42,13 +42,7 @@ class Saving:
 
 
 def _list(core: Core, window: int, command: Command) -> list[Effect]:
-    message = {
-        "type": "files",
-        "folder": core.folder.path.name,
-        "files": core.folder.listing(),
-        "examples": examples(),
-    }
-    return [Tell(message, window), *core.done(window, command)]
+    return [Tell(core.files_message(), window), *core.done(window, command)]
 
 
 def _camera(core: Core, window: int, command: Command) -> list[Effect]:

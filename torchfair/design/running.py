@@ -56,10 +56,9 @@ class BackgroundServer:
         self, settings: ServerSettings, opening: Open | None = None, make_engine: MakeEngine | None = None
     ) -> None:
         require_websockets()
-        from .engine.process import EngineProcess
         from .server import DesignServer
 
-        self.server = DesignServer(settings, opening, make_engine or EngineProcess)
+        self.server = DesignServer(settings, opening, make_engine)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True, name="torchfair-design")
         self._thread.start()

@@ -18,10 +18,10 @@ from websockets.http11 import Request, Response
 from .access import LOOPBACK, Access, new_token
 from .autosave import Keeper
 from .commands import MOST_JSON, PROTOCOL, CommandRefused, read_command
-from .engine.process import EngineProcess
+from .engine import process
 from .engine.requests import Open
 from .folder import OPENS, Folder
-from .formats import examples, formats_message
+from .formats import formats_message
 from .hub import Hub, MakeEngine, Window
 from .limits import MOST_UPLOAD, MOST_VERTICES
 from .session import DesignSession
@@ -71,14 +71,14 @@ class DesignServer:
     """
 
     def __init__(
-        self, settings: ServerSettings, opening: Open | None = None, make_engine: MakeEngine = EngineProcess
+        self, settings: ServerSettings, opening: Open | None = None, make_engine: MakeEngine | None = None
     ) -> None:
         self._settings, self._opening = settings, opening
         self._access = Access(settings.token, [*LOOPBACK, *settings.names])
         self._pages = pages(settings.page)
         self._folder = Folder(settings.folder)
         session = DesignSession(self._folder, time.monotonic, settings.upload_bytes)
-        self.hub = Hub(session, Keeper(self._folder.path), make_engine)
+        self.hub = Hub(session, Keeper(self._folder.path), make_engine or process.EngineProcess)
         self._server: Server | None = None
 
     @property
@@ -200,7 +200,6 @@ class DesignServer:
             "protocol": PROTOCOL,
             "version": __version__,
             "folder": self._folder.path.name,
-            "examples": examples(),
             "open": list(OPENS),
             "save": formats_message(),
             "limits": {"upload_bytes": self._settings.upload_bytes, "vertices": MOST_VERTICES},

@@ -84,10 +84,7 @@ def hermitian_solver(matrix: sp.csr_matrix) -> Callable[[Complexes], Complexes]:
 
 def side_angles(frames: FaceFrames, corners: Ints) -> Floats:
     """(n,) angles, in the frames of faces, of their sides that start at corners ``3 f + k``."""
-    faces, side = corners // 3, corners % 3
-    along = frames.points[frames.triangles[faces, (side + 1) % 3]] - frames.points[frames.triangles[faces, side]]
-    x, y = ((along * axis[faces]).sum(1) for axis in (frames.first, frames.second))
-    return np.asarray(np.arctan2(y, x))
+    return np.asarray(np.angle(frames.sides(corners)))
 
 
 def _along_boundary(frames: FaceFrames) -> Pull:

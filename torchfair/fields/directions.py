@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import torch
 
-from ..geometry import fitted_curvature
+from ..geometry import FittedCurvature, fitted_curvature
 from .frames import Complexes, FaceFrames, Floats, Ints
 
 _FLOOR = 0.1  # of the mean curvature: a difference of curvatures below that is nothing to go by
@@ -44,14 +44,14 @@ class Directions:
         return replace(self, at_corners=-self.at_corners)
 
 
-def directions_of(frames: FaceFrames, rings: int = 2) -> Directions:
+def directions_of(frames: FaceFrames, fitted: FittedCurvature | None = None) -> Directions:
     """Directions by polynomials fitted over rings of vertices.
 
     Args:
         frames: of the triangles.
-        rings: 2 for smooth surfaces, more where there is noise; see :func:`torchfair.geometry.fitted_curvature`.
+        fitted: of :func:`torchfair.geometry.fitted_curvature`, by default over two rings, for smooth surfaces.
     """
-    fitted = fitted_curvature(torch.from_numpy(frames.points), frames.topology, rings=rings)
+    fitted = fitted or fitted_curvature(torch.from_numpy(frames.points), frames.topology, rings=2)
     whole = fitted.traceless.numpy()[frames.triangles]
     axes = np.stack([frames.first, frames.second], axis=1)[:, None]
     plane = axes @ whole @ axes.transpose(0, 1, 3, 2)
@@ -77,9 +77,7 @@ def carried_directions(directions: Directions, frames: FaceFrames, finer: FaceFr
         parents: (F',) coarse triangle of every fine one, in the same plane.
     """
     apart = finer.points[finer.triangles] - frames.centres[parents][:, None]
-    x, y = ((apart * axis[parents][:, None]).sum(-1) for axis in (frames.first, frames.second))
-    slopes = frames.gradients[parents][:, None]
-    weights = 1 / 3 + x[..., None] * slopes.real + y[..., None] * slopes.imag
+    weights = 1 / 3 + (frames.seen(apart, parents)[..., None].conj() * frames.gradients[parents][:, None]).real
     inside = (weights * directions.at_corners[parents][:, None]).sum(-1)
     at_corners = inside * half_turns(frames, finer, parents)[:, None]
     return Directions(at_corners, directions.means[parents], directions.confidence[parents])
@@ -87,5 +85,4 @@ def carried_directions(directions: Directions, frames: FaceFrames, finer: FaceFr
 
 def half_turns(frames: FaceFrames, finer: FaceFrames, parents: Ints) -> Complexes:
     """(F',) by what traceless tensors of coarse triangles are multiplied in the frames of finer ones in them."""
-    x, y = ((frames.first[parents] * axis).sum(1) for axis in (finer.first, finer.second))
-    return np.asarray(np.exp(2j * np.arctan2(y, x)))
+    return np.asarray(np.exp(2j * np.angle(finer.seen(frames.first[parents], np.arange(len(parents))))))

@@ -88,6 +88,18 @@ class FaceFrames:
             inside = np.asarray(near[self.triangles].any(1))
         return inside
 
+    def seen(self, vectors: Floats, faces: Ints) -> Complexes:
+        """(n, ...) vectors (n, ..., 3) in the frames of faces (n,), as complex numbers."""
+        apart = (len(faces), *[1] * (vectors.ndim - 2), 3)
+        x, y = ((vectors * axis[faces].reshape(apart)).sum(-1) for axis in (self.first, self.second))
+        return np.asarray(x + 1j * y)
+
+    def sides(self, corners: Ints) -> Complexes:
+        """(n,) sides that start at corners ``3 f + k``, in the frames of their faces."""
+        faces, side = corners // 3, corners % 3
+        along = self.points[self.triangles[faces, (side + 1) % 3]] - self.points[self.triangles[faces, side]]
+        return self.seen(along, faces)
+
     @property
     def turns(self) -> Floats:
         """(I,) by how much an angle grows from the left face to the right face of an edge."""
@@ -98,8 +110,7 @@ class FaceFrames:
         """(F, 3) gradients of the functions that are 1 at one corner, as complex numbers in the frame."""
         opposite = np.roll(self.points[self.triangles], -2, axis=1) - np.roll(self.points[self.triangles], -1, axis=1)
         inward = np.cross(self.normals[:, None], opposite) / (2 * self.areas)[:, None, None]
-        x, y = ((inward * frame[:, None]).sum(-1) for frame in (self.first, self.second))
-        return np.asarray(x + 1j * y)
+        return self.seen(inward, np.arange(len(inward)))
 
     @cached_property
     def outer_corners(self) -> Ints:

@@ -41,12 +41,14 @@ class FittedCurvature:
         doubts: (*batch, V) expected error of the traceless part, one over the unit of the vertices: standard error
             of ``|k1 - k2| / 2`` in any direction, from what the fit leaves over.
         scales: (*batch, V) root mean square distance of the vertices in the patch, in the unit of the vertices.
+        rings: over how many rings of vertices they were fitted.
     """
 
     normals: Tensor
     operators: Tensor
     doubts: Tensor
     scales: Tensor
+    rings: int
 
     @property
     def curvatures(self) -> Tensor:
@@ -129,7 +131,7 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
     """
     topology.check_vertices(vertices)
     if rings is None:
-        rings = rings_for_noise(vertices, topology)
+        return _fitted_by_noise(vertices, topology)
     patches = rings if isinstance(rings, Patches) else Patches(topology, rings)
     check_count("rings", patches.rings, least=_LEAST_RINGS)
     if patches.places.shape[0] != topology.num_vertices:
@@ -140,7 +142,8 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
     normals, operators, doubts = _forms(heights)
     whole = norm(operators.flatten(-2)).detach()
     doubts = torch.where(patches.sizes > _QUADRATIC, doubts, torch.maximum(doubts, whole))
-    return FittedCurvature(*(x.to(vertices.dtype) for x in (normals, operators, doubts, heights.scale)))
+    normals, operators, doubts, scales = (x.to(vertices.dtype) for x in (normals, operators, doubts, heights.scale))
+    return FittedCurvature(normals, operators, doubts, scales, patches.rings)
 
 
 def rings_for_noise(vertices: Tensor, topology: Topology) -> int:
@@ -159,23 +162,29 @@ def rings_for_noise(vertices: Tensor, topology: Topology) -> int:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
         TorchfairError: inside ``torch.func.vmap``, where numbers cannot be read.
     """
-    least = _relative_doubt(vertices, topology, _LEAST_RINGS)
+    with torch.no_grad():
+        return _fitted_by_noise(vertices.detach(), topology).rings
+
+
+def _fitted_by_noise(vertices: Tensor, topology: Topology) -> FittedCurvature:
+    """Over as many rings as :func:`rings_for_noise` says; the fits that tell are those returned."""
+    fit = fitted_curvature(vertices, topology, rings=_LEAST_RINGS)
+    least = _relative_doubt(fit)
     if not _WANTED < least < math.inf:
-        return _LEAST_RINGS
+        return fit
     wanted = (_LEAST_RINGS + 0.5) * float((least / _WANTED) ** (1 / 3)) - 0.5
     rings = min(max(math.ceil(wanted), _LEAST_RINGS + 1), _MOST_RINGS)
-    return rings if _relative_doubt(vertices, topology, rings) < least else _LEAST_RINGS
+    wider = fitted_curvature(vertices, topology, rings=rings)
+    return wider if _relative_doubt(wider) < least else fit
 
 
-def _relative_doubt(vertices: Tensor, topology: Topology, rings: int) -> float:
-    with torch.no_grad():
-        fit = fitted_curvature(vertices.detach(), topology, rings=rings)
-        size = norm(fit.operators.flatten(-2)) + _FLAT / fit.scales
-        ratios = (fit.doubts / size).flatten()
-        try:
-            return float(ratios.median()) if ratios.numel() else 0.0
-        except RuntimeError as error:
-            raise TorchfairError("rings cannot be chosen by the noise inside vmap. Give a number of rings.") from error
+def _relative_doubt(fit: FittedCurvature) -> float:
+    size = norm(fit.operators.detach().flatten(-2)) + _FLAT / fit.scales.detach()
+    ratios = (fit.doubts.detach() / size).flatten()
+    try:
+        return float(ratios.median()) if ratios.numel() else 0.0
+    except RuntimeError as error:
+        raise TorchfairError("rings cannot be chosen by the noise inside vmap. Give a number of rings.") from error
 
 
 def _forms(heights: Heights) -> tuple[Tensor, Tensor, Tensor]:

@@ -22,6 +22,12 @@ class BoundaryRun(NamedTuple):
     component: int
     corners: list[tuple[int, int]]
 
+    @classmethod
+    def along(cls, corners: Ints, quarter: int) -> BoundaryRun:
+        """Of edges that start at corners ``3 f + k``, along one direction of the field, 0 to 3."""
+        ends = [(int(corner) // 3, (int(corner) % 3 + shift) % 3) for corner in corners for shift in (0, 1)]
+        return cls(1 - quarter % 2, ends)  # along the first axis, 0 or 2, the second coordinate is constant
+
 
 def find_runs(
     frames: FaceFrames, graph: CutGraph, angle: float, shortest: float | Floats, components: tuple[int, ...] = (0, 1)
@@ -65,13 +71,10 @@ def _turned_around(frames: FaceFrames, graph: CutGraph) -> Ints:
 
 def against_field(frames: FaceFrames, graph: CutGraph, corners: Ints) -> tuple[Ints, Floats, Floats]:
     """Of boundary edges that start at corners: nearest direction of the field (0 to 3), angle to it, length."""
-    face, corner = corners // 3, corners % 3
-    start = frames.points[frames.triangles[face, corner]]
-    along = frames.points[frames.triangles[face, (corner + 1) % 3]] - start
-    x, y = ((along * axis[face]).sum(1) for axis in (frames.first, frames.second))
-    against = np.arctan2(y, x) - graph.angles[face]
+    sides = frames.sides(corners)
+    against = np.angle(sides) - graph.angles[corners // 3]
     nearest = np.rint(against / QUARTER)
-    return nearest.astype(np.int64) % 4, np.abs(against - nearest * QUARTER), np.hypot(x, y)
+    return nearest.astype(np.int64) % 4, np.abs(against - nearest * QUARTER), np.abs(sides)
 
 
 def _stretches(follows: Bools, goes_on: Bools) -> list[Ints]:
@@ -88,9 +91,4 @@ def _stretches(follows: Bools, goes_on: Bools) -> list[Ints]:
 def _cut_where_frames_turn(corners: Ints, quarter: Ints) -> list[BoundaryRun]:
     """One run for every part in one frame; parts share the vertex between them, so that they stay one line."""
     parts = np.split(np.arange(len(corners)), np.flatnonzero(np.diff(quarter)) + 1)
-    runs = []
-    for part in parts:
-        ends = [(int(c) // 3, (int(c) % 3 + shift) % 3) for c in corners[part] for shift in (0, 1)]
-        # Along the first axis of the field, quarter 0 or 2, the second coordinate is constant.
-        runs.append(BoundaryRun(1 - int(quarter[part[0]]) % 2, ends))
-    return runs
+    return [BoundaryRun.along(corners[part], int(quarter[part[0]])) for part in parts]

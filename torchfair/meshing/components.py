@@ -15,24 +15,18 @@ from .._numbers import check_count, check_number
 from ..errors import SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
-from ..geometry import fitted_curvature
+from ..geometry import FittedCurvature
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
 from .attempt import PieceMesh
 from .curvature_sizes import CurvatureSizes
 from .curved_surface import on_curved_surface
-from .ladder import NoMeshError, mesh_component
+from .ladder import mesh_component
 from .lattice import Lattice
 from .mesh_creases import MeshCreases
 from .sizes import SizeField
 from .surface import DesignSurface, components_of
 from .verification import Shape, shape_of
-
-_CORRECTIONS = 2
-_SHARE = 1 / 6  # of the time limit, for a correction
-_COUNT_TOLERANCE = 0.08
-_ROUNDING = 1e-9
-_FAR = 0.25  # beyond that other settings are taken for the sake of the count
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +36,14 @@ class ReadSurface:
     Attributes:
         parts: components.
         fields: directions of each.
-        rings: over how many rings curvature of each is averaged.
+        fits: of the curvature of each.
         notes: what was found, in words.
         sizing: lengths of edges over the mean one, which is given, where they are not the same everywhere.
     """
 
     parts: list[DesignSurface]
     fields: list[Directions]
-    rings: list[int]
+    fits: list[FittedCurvature]
     notes: list[str]
     sizing: Callable[[float], CurvatureSizes] | None = None
 
@@ -60,9 +54,8 @@ class ReadSurface:
 
     def curved(self, points: Tensor) -> Tensor:
         """Points on the triangles, moved onto a smooth surface through their vertices, smooth but for creases."""
-        smooth, rings = self.smooth_frames, zip(self._smooth_parts, self.rings, strict=True)
-        fits = [fitted_curvature(torch.from_numpy(of.points), of.topology, rings=many) for of, many in rings]
-        normals, operators = torch.cat([of.normals for of in fits]), torch.cat([of.operators for of in fits])
+        smooth = self.smooth_frames
+        normals, operators = (torch.cat([getattr(of, name) for of in self.fits]) for name in ("normals", "operators"))
         return on_curved_surface(points, torch.from_numpy(smooth.points), smooth.topology, normals, operators)
 
     @cached_property
@@ -75,11 +68,8 @@ class ReadSurface:
         """Of all components, with triangles apart from each other along creases."""
         if not any(part.sharp.any() for part in self.parts):
             return self.frames
-        return FaceFrames.of(*_together([(torch.from_numpy(of.points), of.topology) for of in self._smooth_parts]))
-
-    @cached_property
-    def _smooth_parts(self) -> list[FaceFrames]:
-        return [part.frames.cut_along(part.sharp) if part.sharp.any() else part.frames for part in self.parts]
+        smooth = [part.smooth_frames for part in self.parts]
+        return FaceFrames.of(*_together([(torch.from_numpy(of.points), of.topology) for of in smooth]))
 
     @cached_property
     def directions(self) -> Directions:
@@ -89,6 +79,18 @@ class ReadSurface:
             np.concatenate([of.means for of in self.fields]),
             np.concatenate([of.confidence for of in self.fields]),
         )
+
+    @cached_property
+    def total_absolute_curvature(self) -> float:
+        """C: the integral of both principal curvatures in size, by the fits at the vertices, and of creases ``l l*``.
+
+        On smooth surfaces it is nearer to theirs than :class:`torchfair.energies.TotalAbsoluteCurvature` of the
+        triangles, which misses half of the stars at the boundary, and takes noise for curvature.
+        """
+        bends = torch.cat([of.curvatures for of in self.fits]).abs().sum(-1)
+        smooth = self.smooth_frames
+        inside = smooth.areas @ bends.numpy()[smooth.triangles].mean(1)
+        return float(inside) + sum(part.crease_variation for part in self.parts)
 
     def sized(self, sizes: SizeField) -> list[DesignSurface]:
         """The components with spacings that differ."""
@@ -106,11 +108,11 @@ def read_surface(vertices: Tensor, topology: Topology, settings: MeshingSettings
     parts = components_of(vertices, topology, settings.crease_angle)
     found = [part.directions(settings.noise) for part in parts]
     notes = [
-        f"{_name(number, len(parts))}the surface is rough: curvature fitted over {rings} rings"
-        for number, (_, rings) in enumerate(found)
-        if rings > 2 and settings.noise == "auto"
+        f"{_name(number, len(parts))}the surface is rough: curvature fitted over {fitted.rings} rings"
+        for number, (_, fitted) in enumerate(found)
+        if fitted.rings > 2 and settings.noise == "auto"
     ]
-    return ReadSurface(parts, [of for of, _ in found], [rings for _, rings in found], notes)
+    return ReadSurface(parts, [of for of, _ in found], [fitted for _, fitted in found], notes)
 
 
 def spacing_of(surface: ReadSurface, face_area: float, count: int | None, spacing: float | None) -> float:
@@ -180,7 +182,7 @@ def mesh_components(
     sizes = surface.sizing and surface.sizing(spacing)
     parts = surface.parts if sizes is None else surface.sized(sizes.field)
     for number, (part, directions) in enumerate(zip(parts, surface.fields, strict=True)):
-        smoothing = settings.smoothing_length(surface.rings[number])
+        smoothing = settings.smoothing_length(surface.fits[number].rings)
         begin = 0 if first is None else first[number]
         mesh, words, plan = mesh_component(part, directions, lattices[number], spacing, smoothing, settings, begin)
         taken.append(plan)
@@ -204,51 +206,6 @@ def mesh_components(
         taken,
         sizes,
     )
-
-
-def mesh_to_count(
-    surface: ReadSurface,
-    lattices: list[Lattice],
-    spacing: float,
-    settings: MeshingSettings,
-    count: int | None,
-    faces_of: Callable[[Pieces], int],
-) -> tuple[Pieces, float]:
-    """Meshes with a spacing, then with others until the count is about that asked for; and the last spacing.
-
-    Directions that turn make lines diverge, so that cells are larger or smaller than the spacing says.
-
-    Args:
-        surface: with its directions.
-        lattices: of the components.
-        spacing: to start with.
-        settings: of the meshes.
-        count: None where the spacing is what was asked for.
-        faces_of: how many faces pieces have.
-
-    Raises:
-        NoMeshError: if the first spacing gives no valid mesh.
-    """
-    best = mesh_components(surface, lattices, spacing, settings)
-    if count is None:
-        return best, spacing
-    short = replace(settings, time_limit=settings.time_limit * _SHARE)
-    for _ in range(_CORRECTIONS):
-        ratio = faces_of(best) / count
-        if abs(ratio - 1) <= _COUNT_TOLERANCE:
-            break
-        other = spacing * math.sqrt(ratio)
-        try:
-            again = mesh_components(surface, lattices, other, short, best.plans)
-        except NoMeshError:
-            break
-        lost = again.creases.length < (1 - _ROUNDING) * best.creases.length
-        if lost or abs(faces_of(again) / count - 1) >= abs(ratio - 1):
-            break
-        if len(again.notes) > len(best.notes) and abs(ratio - 1) <= _FAR:
-            break
-        best, spacing = again, other
-    return best, spacing
 
 
 def on_surface(pieces: Pieces, surface: ReadSurface, settings: MeshingSettings) -> Pieces:

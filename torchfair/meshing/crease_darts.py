@@ -10,7 +10,7 @@ import numpy as np
 from ..fields.frames import FaceFrames, Ints
 from .chords import BrokenLinesError
 from .crease_runs import CreaseLines
-from .creases import CreaseChain
+from .creases import SharpChain
 from .crossings import Crossings
 
 CUTS = 3
@@ -59,7 +59,7 @@ def crease_darts(frames: FaceFrames, lines: CreaseLines, crossings: Crossings, n
     return CreaseDarts(origin, edge, along.astype(bool), coordinates)
 
 
-def _stops(frames: FaceFrames, chain: CreaseChain, crossings: Crossings, name: Ints) -> list[tuple[int, int, int]]:
+def _stops(frames: FaceFrames, chain: SharpChain, crossings: Crossings, name: Ints) -> list[tuple[int, int, int]]:
     """Nodes along a chain with the places in it of the edges before and after; of a loop the first again at its end."""
     stops: list[tuple[int, int, int]] = []
     last = len(chain.edges) - 1

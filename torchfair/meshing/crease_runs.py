@@ -8,7 +8,7 @@ import numpy as np
 
 from ..fields.frames import Bools, FaceFrames, Floats, Ints
 from .boundary_runs import BoundaryRun, against_field
-from .creases import CreaseChain, Creases
+from .creases import Creases, SharpChain
 from .cut_graph import CutGraph
 from .seams import Seams
 
@@ -77,7 +77,7 @@ def crease_lines(
 
 
 def _follows(
-    frames: FaceFrames, graph: CutGraph, seams: Seams, chain: CreaseChain, angle: float, components: tuple[int, ...]
+    frames: FaceFrames, graph: CutGraph, seams: Seams, chain: SharpChain, angle: float, components: tuple[int, ...]
 ) -> list[BoundaryRun]:
     """The runs of a chain, none if it does not follow the field."""
     face, corner = frames.faces[chain.edges, 0], frames.corners[chain.edges, 0]
@@ -92,8 +92,6 @@ def _follows(
     goes_on = (quarter[1:] == (quarter[:-1] + turn) % 4) | graph.nodes[chain.vertices[1:-1]]
     if not goes_on.all():
         return []
-    runs = []
-    for part in np.split(np.arange(len(face)), np.flatnonzero(arrives[:-1] != leaves[1:]) + 1):
-        ends = [(int(face[k]), (int(corner[k]) + shift) % 3) for k in part for shift in (0, 1)]
-        runs.append(BoundaryRun(1 - int(quarter[part[0]]) % 2, ends))
+    parts = np.split(np.arange(len(face)), np.flatnonzero(arrives[:-1] != leaves[1:]) + 1)
+    runs = [BoundaryRun.along(3 * face[part] + corner[part], int(quarter[part[0]])) for part in parts]
     return runs if all(run.component in components for run in runs) else []

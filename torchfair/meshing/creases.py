@@ -20,7 +20,7 @@ _LOOSE = 0.1  # of them for a sharp edge: more are a sign of noise
 
 
 @dataclass(frozen=True, eq=False)
-class CreaseChain:
+class SharpChain:
     """Sharp edges one after the other.
 
     Attributes:
@@ -53,7 +53,7 @@ class Creases:
     edges: Bools
     degrees: Ints
     corners: Bools
-    chains: list[CreaseChain]
+    chains: list[SharpChain]
 
     def away_from(self, points: Floats, places: Floats, distance: float) -> list[bool]:
         """Which chains keep a distance from all places (n, 3); of vertices at points (V, 3)."""
@@ -112,9 +112,12 @@ def crease_pull(frames: FaceFrames, creases: Creases) -> tuple[Pull, Ints]:
 def _chains(frames: FaceFrames, sharp: Bools, corner_angle: float) -> Creases:
     edges, topology = torch.from_numpy(np.flatnonzero(sharp)), frames.topology
     corners = crease_corners(torch.from_numpy(frames.points), topology, edges, corner_angle)
-    chains = []
-    for chain in crease_chains(topology, edges, corners):
-        around = torch.cat([chain.vertices, chain.vertices[:1]]) if chain.closed else chain.vertices
-        numbers = edge_numbers(topology, torch.stack([around[:-1], around[1:]], 1))
-        chains.append(CreaseChain(around.numpy(), numbers.numpy(), chain.closed))
+    found = crease_chains(topology, edges, corners)
+    walks = [torch.cat([chain.vertices, chain.vertices[:1]]) if chain.closed else chain.vertices for chain in found]
+    pairs = [torch.stack([walk[:-1], walk[1:]], 1) for walk in walks]
+    numbers = torch.split(edge_numbers(topology, torch.cat([*pairs, edges.new_zeros(0, 2)])), [len(of) for of in pairs])
+    chains = [
+        SharpChain(walk.numpy(), of.numpy(), chain.closed)
+        for walk, of, chain in zip(walks, numbers, found, strict=True)
+    ]
     return Creases(sharp, _degrees(frames.edges[sharp], len(frames.points)), corners.numpy(), chains)

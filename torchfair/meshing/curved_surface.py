@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..geometry import ReferenceSurface
+from ..geometry import ReferenceSurface, face_normals
 from ..topology import Topology
 
 _AT_VERTEX = 1 - 1e-9  # barycentric coordinate
@@ -51,9 +51,7 @@ def on_curved_surface(
 def _straight(vertices: Tensor, topology: Topology, normals: Tensor) -> Tensor:
     """(V,) one where the faces around a vertex are nearly orthogonal to its normal, zero elsewhere."""
     triangles = topology.triangles
-    a, b, c = vertices[triangles].unbind(1)
-    faces = torch.nn.functional.normalize(torch.linalg.cross(b - a, c - a), dim=1)
-    cosines = (normals[triangles] * faces[:, None]).sum(-1)
+    cosines = (normals[triangles] * face_normals(vertices, topology)[:, None]).sum(-1)
     least = torch.ones_like(vertices[:, 0])
     least = least.scatter_reduce(0, triangles.flatten(), cosines.flatten(), "amin")
     return (least > _STRAIGHT).to(vertices)

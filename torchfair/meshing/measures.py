@@ -42,8 +42,7 @@ def angles_to_directions(
     faces, weights = closest.faces.cpu().numpy(), closest.weights.cpu().numpy()
     principal = np.angle((weights * directions.at_corners[faces]).sum(1))
     along = (ends[:, 1] - ends[:, 0]).cpu().numpy()
-    x, y = ((along * axis[faces]).sum(1) for axis in (frames.first, frames.second))
-    against = 2 * np.arctan2(y, x) - principal
+    against = 2 * np.angle(frames.seen(along, faces)) - principal
     angles = np.abs(np.arctan2(np.sin(2 * against), np.cos(2 * against))) / 4
     return np.asarray(angles[has_direction(directions, spacing)[faces]])
 

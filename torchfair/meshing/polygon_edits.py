@@ -88,7 +88,7 @@ class PolygonEdits:
             Whether it is an edge and that left a manifold without faces turned over; otherwise nothing has changed.
         """
         stays, goes = edge
-        if self._rank(goes) > self._rank(stays):
+        if self._outranks(goes, stays):
             stays, goes = goes, stays
         shared = self.around[stays] & self.around[goes]
         sides = sum(self._has(number, edge) or self._has(number, edge[::-1]) for number in shared)
@@ -106,10 +106,13 @@ class PolygonEdits:
             changed[number] = face if len(face) >= 3 else []
         return self._allowed(changed) and self._apply(changed, goes, stays)
 
-    def _rank(self, node: int) -> tuple[bool, bool, int, float]:
-        """Of two nodes the higher one stays; the last is by geometry, so that numbers do not decide."""
-        around = self.around[node]
-        return bool(self.fixed[node]), bool(self.on_curve[node]), len(around), sum(sorted(map(self.area, around)))
+    def _outranks(self, node: int, other: int) -> bool:
+        """Whether a node stays rather than another; among equals by geometry, so that numbers do not decide."""
+        ranks = [(bool(self.fixed[of]), bool(self.on_curve[of]), len(self.around[of])) for of in (node, other)]
+        if ranks[0] != ranks[1]:
+            return ranks[0] > ranks[1]
+        areas = [sum(sorted(map(self.area, self.around[of]))) for of in (node, other)]
+        return areas[0] > areas[1]
 
     def merge(self, number: int, edge: Edge) -> bool:
         """Makes one face of a face and its neighbour across an edge; see :meth:`collapse`."""

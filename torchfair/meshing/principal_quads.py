@@ -9,7 +9,8 @@ from torch import Tensor
 
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
-from .components import mesh_to_count, on_surface, read_surface, spacing_of
+from .components import on_surface, read_surface, spacing_of
+from .counts import mesh_to_count
 from .curvature_sizes import CurvatureSizes, curvature_sizes
 from .lattice import SQUARES
 from .quad_mesh import QuadMesh
@@ -47,11 +48,13 @@ def principal_quads(
         settings: :class:`MeshingSettings`, by default those.
 
     Returns:
-        The mesh. Its report has ``angle_mean_degrees`` and ``angle_95_degrees`` between inner edges and principal
-        directions (None where there are none), ``planarity_mean`` and ``planarity_max``
-        (:func:`torchfair.geometry.planarity`), ``normal_variation`` (E), ``total_absolute_curvature`` (C, of the
-        surface) and their ratio ``variation_over_curvature`` (None for flat surfaces), ``distance_max`` of the middles
-        of edges and faces from the surface in mean edges, ``singular`` points by index, ``total_index``, and sizes.
+        The mesh. Its report has ``angle_mean_degrees`` and ``angle_95_degrees`` between inner edges and
+        principal directions (None where there are none), ``planarity_mean`` and ``planarity_max``
+        (:func:`torchfair.geometry.planarity`), ``normal_variation`` (E), ``total_absolute_curvature`` (C, of
+        the smooth surface through the vertices, with ``l l*`` of creases) and their ratio
+        ``variation_over_curvature`` (None for flat surfaces), ``distance_max`` of the middles of edges and
+        faces from the surface in mean edges, ``shortest_edge`` in mean edges, ``smallest_angle_degrees`` at
+        corners, ``singular`` points by index, ``total_index``, and sizes.
         Adaptive meshes have ``spacing_shortest`` and ``spacing_longest``, as asked for, and ``range_share``, the share
         of the area where curvature asks for a length out of the range.
 

@@ -11,7 +11,8 @@ from .._graph import edge_numbers
 from ..principal import PrincipalEdges
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
-from .components import Pieces, mesh_to_count, on_surface, read_surface, spacing_of
+from .components import Pieces, on_surface, read_surface, spacing_of
+from .counts import mesh_to_count
 from .curvature_sizes import CurvatureSizes, curvature_sizes
 from .cut_cells import cut_cells
 from .lattice import triangle_lattice

@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 
 from .._one_mesh import one_mesh
-from ..energies import NormalVariation, TotalAbsoluteCurvature
-from ..geometry import ReferenceSurface, edge_lengths, face_centres, planarity
+from ..energies import NormalVariation
+from ..geometry import ReferenceSurface, corner_angles, edge_lengths, face_centres, planarity
 from ..topology import Topology
 from .components import ReadSurface
 from .curvature_sizes import ASKED
@@ -46,9 +46,10 @@ def measure(
     angles = np.degrees(angles_to_directions(vertices, topology, reference, frames, directions, spacing, chosen))
     sizes = topology.face_sizes
     deviation = planarity(vertices, topology)
-    mean_edge = float(edge_lengths(vertices, topology).mean())
+    lengths = edge_lengths(vertices, topology)
+    mean_edge = float(lengths.mean())
     variation = float(NormalVariation(topology)(vertices))
-    curvature = float(TotalAbsoluteCurvature(surface.whole[1])(surface.whole[0]))
+    curvature = surface.total_absolute_curvature
     middles = torch.cat([face_centres(vertices, topology), vertices[topology.edges].mean(1)])
     shape = shape_of(topology)
     return {
@@ -63,6 +64,8 @@ def measure(
         "total_absolute_curvature": curvature,
         "variation_over_curvature": variation / curvature if curvature > 1e-9 * mean_edge else None,
         "distance_max": float(reference.closest(middles).distances.max()) / mean_edge,
+        "shortest_edge": float(lengths.min()) / mean_edge,
+        "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
         "crease_edges": len(creases.edges),
         "crease_distance_max": creases.distance(vertices) / mean_edge,
         "mean_edge": mean_edge,

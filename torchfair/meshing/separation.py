@@ -28,19 +28,18 @@ def gaps(frames: FaceFrames, graph: CutGraph, seams: Seams, radius: float) -> sp
         radius: pairs that are farther from each other on the surface are left out; of many the nearest hundred stay.
     """
     singular = np.flatnonzero(graph.charges)
-    at = [np.flatnonzero((frames.triangles == vertex).any(1)) for vertex in singular]
     if len(singular) < 2:
         return sp.csr_matrix(np.zeros((0, len(seams.vertex)), complex))
+    at = [np.flatnonzero((frames.triangles == vertex).any(1)) for vertex in singular]
     starts = np.array([faces[0] for faces in at])
     distance, before = dijkstra(dual_graph(frames), indices=starts, limit=radius, return_predecessors=True)
-    pairs = []
-    for first, second in itertools.combinations(range(len(singular)), 2):
-        face = int(at[second][np.argmin(distance[first, at[second]])])
-        if np.isfinite(distance[first, face]):
-            pairs.append((float(distance[first, face]), first, second, face))
+    nearest = np.stack([faces[np.argmin(distance[:, faces], axis=1)] for faces in at], axis=1)
+    gap = np.triu(np.take_along_axis(distance, nearest, axis=1), 1)
+    pairs = np.argwhere(np.isfinite(gap) & np.triu(np.ones(gap.shape, bool), 1))
+    closest = np.sort(np.argsort(gap[tuple(pairs.T)], kind="stable")[:_PAIRS])
     rows = []
-    for _, first, second, face in sorted(sorted(pairs)[:_PAIRS], key=lambda pair: pair[1:]):
-        path = [face]
+    for first, second in pairs[closest].tolist():
+        path = [int(nearest[first, second])]
         while path[-1] != starts[first]:
             path.append(int(before[first, path[-1]]))
         rows.append(_gap(frames, graph, seams, path[::-1], int(singular[first]), int(singular[second])))

@@ -16,7 +16,7 @@ from .._one_mesh import one_mesh
 from ..errors import MeshError
 from ..fields import Directions, FaceFrames, carried_directions, directions_of
 from ..fields.frames import Bools
-from ..geometry import degenerate_faces, rings_for_noise
+from ..geometry import FittedCurvature, degenerate_faces, dual_edge_lengths, edge_lengths, fitted_curvature
 from ..subdivision import midpoint
 from ..topology import Topology
 from ..triangulation import triangulate
@@ -51,14 +51,26 @@ class DesignSurface:
         """Of the triangles."""
         return FaceFrames.of(self.vertices, self.topology)
 
-    def directions(self, rings: int | Literal["auto"]) -> tuple[Directions, int]:
-        """Principal directions by so many rings, and their number; ``"auto"`` chooses it by the noise.
+    @cached_property
+    def smooth_frames(self) -> FaceFrames:
+        """Of the triangles, apart from each other along creases."""
+        return self.frames.cut_along(self.sharp) if self.sharp.any() else self.frames
+
+    def directions(self, rings: int | Literal["auto"]) -> tuple[Directions, FittedCurvature]:
+        """Principal directions by so many rings, and the fits that say them; ``"auto"`` chooses rings by the noise.
 
         Nothing reaches across creases.
         """
-        smooth = self.frames.cut_along(self.sharp) if self.sharp.any() else self.frames
-        number = rings_for_noise(torch.from_numpy(smooth.points), smooth.topology) if rings == "auto" else rings
-        return directions_of(smooth, number), number
+        smooth, number = self.smooth_frames, None if rings == "auto" else rings
+        fitted = fitted_curvature(torch.from_numpy(smooth.points), smooth.topology, rings=number)
+        return directions_of(smooth, fitted), fitted
+
+    @property
+    def crease_variation(self) -> float:
+        """E of the sharp edges."""
+        chosen = torch.from_numpy(np.flatnonzero(self.sharp))
+        gauss = dual_edge_lengths(self.vertices, self.topology)[chosen]
+        return float(edge_lengths(self.vertices, self.topology)[chosen] @ gauss)
 
     def without_creases(self) -> DesignSurface:
         """The same as one smooth surface."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -54,6 +55,10 @@ class _Patch:
     areas: Floats
     weights: Floats
     moves: sp.csr_matrix
+
+    @cached_property
+    def _transposed(self) -> sp.csr_matrix:
+        return self.slope.T.tocsr()
 
     @classmethod
     def around(cls, problem: MapProblem, found: SeamlessMap, rings: int) -> _Patch:
@@ -115,7 +120,7 @@ class _Patch:
         off = jacobian - WANTED[:, None]
         energy = self.areas @ (size / chi + _ALIGNMENT * (self.weights * off**2).sum(0))
         slope = self.areas * (slope + 2 * _ALIGNMENT * self.weights * off)
-        return float(energy), np.asarray(self.slope.T @ slope.ravel())
+        return float(energy), np.asarray(self._transposed @ slope.ravel())
 
 
 def _movable(problem: MapProblem, copies: Ints, allowed: Bools) -> Ints:

@@ -6,6 +6,7 @@ import math
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, TextIO
 
@@ -54,7 +55,8 @@ class ProgressDisplay:
 
     On a terminal one line is redrawn in place, at most ten times a second. Otherwise plain lines are printed and
     flushed: the first record, every ``every``-th, and the last. The time left is that of
-    :class:`~torchfair.progress.TimeLeft`, an upper estimate. Never asks the solver to stop.
+    :class:`~torchfair.progress.TimeLeft`, an upper estimate. Never asks the solver to stop, nor ends
+    it where the stream is closed.
 
     Example::
 
@@ -106,7 +108,8 @@ class ProgressDisplay:
         if self._last is not None and self._last is not self._shown:
             self._show(self._last)
         if self._live is not None:
-            self._live.stop()
+            with suppress(OSError):
+                self._live.stop()
             self._live = None
 
     def __call__(self, record: Record) -> None:
@@ -121,11 +124,12 @@ class ProgressDisplay:
 
     def _show(self, record: Record) -> None:
         self._shown = record
-        if self._live is None:
-            print("  ".join(self._words(record)), file=self._stream, flush=True)
-        else:
-            self._live.update(self._renderable(record), refresh=True)
-            self._repainted = time.monotonic()
+        with suppress(OSError):  # the terminal is closed: nobody looks, but the work goes on
+            if self._live is None:
+                print("  ".join(self._words(record)), file=self._stream, flush=True)
+            else:
+                self._live.update(self._renderable(record), refresh=True)
+                self._repainted = time.monotonic()
 
     def _words(self, record: Record) -> list[str]:
         left = self._time_left.seconds()

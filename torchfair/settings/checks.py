@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
+from typing import Any
 
-from .._numbers import is_number
+from .._numbers import check_number, is_number
 from ..errors import SettingsError
 
 
@@ -24,3 +26,17 @@ def check_weights(settings: object) -> None:
     ]
     if wrong:
         raise SettingsError(f"weights must be at least 0: {', '.join(wrong)}; give finite numbers")
+
+
+def check_angles(settings: Any) -> None:
+    """Raises SettingsError naming a field in radians that is no angle from 0 to pi; most often it is in degrees."""
+    for field in dataclasses.fields(settings):
+        value = getattr(settings, field.name)
+        if field.metadata.get("unit") != "radians":
+            continue
+        check_number(field.name, value)
+        if value > math.pi:
+            raise SettingsError(
+                f"{field.name} must be an angle of at most pi radians (180 degrees), got {value!r}; math.radians takes "
+                "degrees"
+            )

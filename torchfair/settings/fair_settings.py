@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 from .._numbers import check_number, is_number
 from ..errors import SettingsError
-from .checks import check_choice, check_weights
+from .checks import check_angles, check_choice, check_weights
 from .printed import printed_projection
 from .projection_settings import ProjectionSettings
 from .setting import setting
@@ -187,19 +187,18 @@ class FairSettings:
         if isinstance(self.flat, str) and self.flat not in get_args(Flat):
             raise SettingsError(f"flat must be one of {', '.join(get_args(Flat))} or edge numbers, got {self.flat!r}")
         for name in (
-            "smallest_angle",
-            "smallest_area",
-            "smallest_edge",
             "planar_tolerance",
+            "planar_reach",
             "planar_distance",
             "flat_tolerance",
-            "corner_angle",
         ):
             check_number(name, getattr(self, name))
         check_number("largest_area", self.largest_area, least=1.0)
         check_number("reference_distance", self.reference_distance, above=True)
         check_number("distance_back", self.distance_back, above=True)
-        check_number("crease_angle", self.crease_angle, most=math.pi)
+        for name in ("smallest_area", "smallest_edge"):
+            check_number(name, getattr(self, name), most=1.0)
+        check_angles(self)
         check_number("smoothing", self.smoothing, above=True, finite=True)
         factors = self.continuation if isinstance(self.continuation, Iterable) else (self.continuation,)
         if not all(is_number(factor) and 1.0 < factor < math.inf for factor in factors):

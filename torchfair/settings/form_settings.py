@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from .._numbers import check_number
 from ..errors import SettingsError
-from .checks import check_choice, check_weights
+from .checks import check_angles, check_choice, check_weights
 from .printed import printed_projection
 from .projection_settings import ProjectionSettings
 from .setting import setting
@@ -127,6 +128,9 @@ class FormSettings:
         check_choice(self, "formulation", get_args(Formulation))
         check_choice(self, "absolute_value", get_args(AbsoluteValue))
         check_weights(self)
+        check_angles(self)
+        for name in ("coarse_smoothing", "smoothing"):
+            check_number(name, getattr(self, name), above=True, finite=True)
         if not 0.0 < self.smoothing <= self.coarse_smoothing < math.inf:
             raise SettingsError(
                 f"smoothing must be positive and at most coarse_smoothing, got {self.smoothing} and "

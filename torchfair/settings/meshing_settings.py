@@ -8,6 +8,7 @@ from typing import Literal
 
 from .._numbers import check_count, check_number
 from ..errors import SettingsError
+from .checks import check_angles
 from .setting import setting
 
 _SHORTEST = 1 / 16  # smoothing length in edges, where curvature is fitted over two rings
@@ -61,9 +62,9 @@ class MeshingSettings:
         for name in ("align_boundary", "adaptive", "curved", "fallback"):
             if not isinstance(getattr(self, name), bool):
                 raise SettingsError(f"{name} must be True or False, got {getattr(self, name)!r}")
+        check_angles(self)
         check_number("boundary_angle", self.boundary_angle, most=math.pi / 4)
-        check_number("corner_angle", self.corner_angle, above=True, most=math.pi)
-        check_number("crease_angle", self.crease_angle, most=math.pi)
+        check_number("corner_angle", self.corner_angle, above=True)
         check_number("time_limit", self.time_limit)
 
     def smoothing_length(self, rings: int) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from .._numbers import check_count, check_number
-from .checks import check_choice, check_weights
+from .checks import check_angles, check_choice, check_weights
 from .printed import printed_projection
 from .projection_settings import ProjectionSettings
 from .setting import setting
@@ -137,5 +137,9 @@ class SymmetricSettings:
         check_weights(self)
         for name in ("constraint_weight", "tight_weight"):
             check_number(name, getattr(self, name), above=True)
+        check_angles(self)
+        check_number("energy_smoothing", self.energy_smoothing, above=True, finite=True)
+        check_number("saddle_margin", self.saddle_margin, finite=True)
+        check_number("tolerance", self.tolerance, above=True)
         check_count("most_steps", self.most_steps, least=1)
         check_count("rounds", self.rounds, least=0)

@@ -166,7 +166,13 @@ class Event:
 
 @dataclass(frozen=True)
 class Started(Event):
-    """The engine is there."""
+    """The engine is there.
+
+    Attributes:
+        examples: Names of meshes that need no file.
+    """
+
+    examples: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any
 from torch import Tensor
 
 from ...errors import TorchfairError
+from ...shapes import EXAMPLES, SURFACES
 from ..containers import AT_REST, DRAGGING, JUMP
 from ..document import Document
 from . import requests as r
@@ -47,7 +48,7 @@ class Worker:
 
     def run(self) -> None:
         """Until the other end of the pipe is gone. Nothing is computed while nothing has to be done."""
-        self._say(r.Started(0))
+        self._say(r.Started(0, (*EXAMPLES, *SURFACES)))
         while True:
             self.do(self.next())
 
