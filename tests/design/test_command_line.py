@@ -32,6 +32,7 @@ def pull(bench: Bench, vertex: int, outwards: float = 0.05) -> None:
     assert not bench.errors
 
 
+@pytest.mark.slow
 def test_one_command_repeats_a_drag(bench: Bench, tube: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert told(bench)["text"] == "torchfair measure tube.obj"
     bench.say(type="hold", vertices=[40])
@@ -68,7 +69,8 @@ def test_what_was_meshed_is_meshed_first(bench: Bench) -> None:
     assert not message["exact"]
     for words in commands:
         arguments, unknown = build_parser().parse_known_args(words[1:])
-        assert (unknown, arguments.input) == ([], words[2])
+        assert not unknown
+        assert arguments.input in (words[2], [words[2]])
 
 
 @pytest.mark.parametrize("mode", list(SETTINGS))
