@@ -15,7 +15,8 @@ from torchfair.design.commands import Command, checked_command
 from torchfair.design.containers import unpack
 from torchfair.design.document import Document, Faces
 from torchfair.design.effects import Ask, Autosave, Deliver, Draw, Effect, StartEngine, Store, Tell, Wake
-from torchfair.design.engine.requests import Event, Failed, Open, Request, Shown
+from torchfair.design.engine.requests import Open, Request
+from torchfair.design.engine.saying import Event, Failed, Shown
 from torchfair.design.engine.worker import Worker
 from torchfair.design.folder import Folder
 from torchfair.design.session import DesignSession

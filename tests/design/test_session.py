@@ -17,6 +17,7 @@ from torchfair.design.commands import CommandRefused, read_command
 from torchfair.design.containers import AT_REST, DRAGGING, JUMP
 from torchfair.design.effects import Ask, Autosave, Deliver, Tell, Wake
 from torchfair.design.engine import requests as r
+from torchfair.design.engine import saying as say
 from torchfair.design.states import DesignState
 from torchfair.energies import normal_variation
 from torchfair.formfinding import condition_residuals
@@ -357,7 +358,7 @@ def test_a_lost_engine_comes_back_with_the_last_settled_shape(bench: Bench) -> N
     assert bench.session.state is S.LOST
     assert bench.starts == 2
     bench.worker = bench._worker()
-    bench.carry_out(bench.session.engine_said(r.Started(0)))
+    bench.carry_out(bench.session.engine_said(say.Started(0)))
     assert bench.session.state is S.RESTORING
     bench.run()
     assert bench.session.state is S.READY
@@ -371,7 +372,7 @@ def test_a_lost_engine_comes_back_with_the_last_settled_shape(bench: Bench) -> N
 def test_what_an_engine_says_late_is_not_heard(bench: Bench) -> None:
     drag(bench)
     now = bench.session.history.now
-    for event in (r.Done(1, now.start), r.Failed(2, "old"), r.Made(1, (now,)), r.Answered(1, b"")):
+    for event in (say.Done(1, now.start), say.Failed(2, "old"), say.Made(1, (now,)), say.Answered(1, b"")):
         assert bench.session.engine_said(event) == []
     assert bench.session.history.now is now
 

@@ -13,6 +13,7 @@ from torchfair.design.commands import COMMANDS, Command, checked_command
 from torchfair.design.edits import EDITS
 from torchfair.design.effects import Ask, Effect, StartEngine, Tell
 from torchfair.design.engine import requests as r
+from torchfair.design.engine import saying as say
 from torchfair.design.folder import Folder
 from torchfair.design.inquiries import INQUIRIES
 from torchfair.design.session import DesignSession
@@ -69,11 +70,11 @@ def ready() -> DesignSession:
     session = empty()
     serial = serial_of(session.begin(r.Open(0, "two.obj")))
     document = triangle_document()
-    session.engine_said(r.Said(serial, "settings", SETTINGS))
-    taken = session.engine_said(r.Made(serial, (document,)))
-    session.engine_said(r.Done(serial_of(taken), document.vertices))
+    session.engine_said(say.Said(serial, "settings", SETTINGS))
+    taken = session.engine_said(say.Made(serial, (document,)))
+    session.engine_said(say.Done(serial_of(taken), document.vertices))
     for kind in ("hold", "hold", "undo"):
-        session.engine_said(r.Done(serial_of(session.command(1, command(kind))), document.vertices))
+        session.engine_said(say.Done(serial_of(session.command(1, command(kind))), document.vertices))
     return session
 
 
@@ -86,7 +87,7 @@ def empty() -> DesignSession:
 def opening() -> DesignSession:
     session = empty()
     serial = serial_of(session.begin(r.Open(0, "two.obj")))
-    session.engine_said(r.Asked(serial, "broken", (("repair", "repair"), ("cancel", "no"))))
+    session.engine_said(say.Asked(serial, "broken", (("repair", "repair"), ("cancel", "no"))))
     return session
 
 
@@ -108,7 +109,7 @@ def lost() -> DesignSession:
 
 def restoring() -> DesignSession:
     session = lost()
-    session.engine_said(r.Started(0))
+    session.engine_said(say.Started(0))
     return session
 
 
@@ -181,5 +182,5 @@ def test_ends_far_apart_are_no_reason_to_give_up() -> None:
     for _ in range(10):
         time[0] += 61.0
         session.engine_lost()
-        session.engine_said(r.Started(0))
+        session.engine_said(say.Started(0))
     assert session.state is S.EMPTY

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,10 @@ from .commands import Command, CommandRefused
 from .document import Document
 from .effects import Ask, Autosave, Effect, StartEngine, Tell
 from .engine import requests as r
+from .engine import saying as say
 from .folder import Folder
 from .history import History
+from .pending import Drag, Pending
 from .questions import kept_question
 from .session_file import session_bytes
 from .states import DesignState, allowed
@@ -22,45 +24,6 @@ S = DesignState
 _RESTARTS, _WITHIN = 3, 60.0  # seconds
 _AUTOSAVED = 20  # states
 _CHANGING = ("drag", "settle", "solve", "edit", "undo", "redo")
-
-
-@dataclass(frozen=True)
-class Pending:
-    """What the engine is doing.
-
-    Attributes:
-        serial: Of the request.
-        what: Such as ``drag``.
-        document: What there will be once it is done, but for its places; None where nothing changes.
-        window, id: Whose command it is.
-        busy: In words.
-        extra: What else belongs to it.
-    """
-
-    serial: int
-    what: str
-    document: Document | None = None
-    window: int | None = None
-    id: int | None = None
-    busy: str = ""
-    extra: Any = None
-
-
-@dataclass
-class Drag:
-    """What is being dragged.
-
-    Attributes:
-        serial: Of its requests.
-        window: That drags.
-        document: With handles and weights as they are now.
-        began: How it was before.
-    """
-
-    serial: int
-    window: int
-    document: Document
-    began: Document
 
 
 class Core:
@@ -89,7 +52,7 @@ class Core:
         self.drag: Drag | None = None
         self.question: dict[str, Any] | None = None
         self.kept: dict[str, dict[str, Any] | bytes] = {}
-        self.frame: r.Shown | None = None
+        self.frame: say.Shown | None = None
         self.frames = self.questions = self.serial = 0
         self.windows: dict[int, tuple[str, ...]] = {}
         self.camera: Mapping[str, Any] | None = None

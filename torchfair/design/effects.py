@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .engine.requests import Request, Shown
+from .engine.requests import Request
+from .engine.saying import Shown
 
 
 @dataclass(frozen=True)

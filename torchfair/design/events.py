@@ -9,24 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from .core import Core, Pending
+from .core import Core
 from .document import Document
 from .effects import Ask, Draw, Effect, Tell
 from .engine import requests as r
+from .engine import saying as say
 from .history import History
 from .inquiries import Saving
+from .pending import Pending
 from .states import DesignState
 from .telling import done_messages, error_message, notice
 
 S = DesignState
 
 
-def heard(core: Core, event: r.Event) -> list[Effect]:
+def heard(core: Core, event: say.Event) -> list[Effect]:
     """What has to be done; nothing for what belongs to nothing that is going on."""
     at_once = _AT_ONCE.get(type(event))
     if at_once is not None:
         return at_once(core, event)
-    if core.drag is not None and event.serial == core.drag.serial and isinstance(event, r.Failed):
+    if core.drag is not None and event.serial == core.drag.serial and isinstance(event, say.Failed):
         return _drag_failed(core, event)
     pending = core.pending
     if pending is None or event.serial != pending.serial:
@@ -37,7 +39,7 @@ def heard(core: Core, event: r.Event) -> list[Effect]:
 # ---- at once ---------------------------------------------------------------------------------------------------------
 
 
-def _started(core: Core, event: r.Started) -> list[Effect]:
+def _started(core: Core, event: say.Started) -> list[Effect]:
     new, core.examples = event.examples != core.examples, event.examples
     effects: list[Effect] = [core.watch(), *([Tell(core.files_message())] if new else [])]
     if core.paused:
@@ -49,12 +51,12 @@ def _started(core: Core, event: r.Started) -> list[Effect]:
     return [*effects, *core.take("restore", core.now, busy="brings the last settled shape back", state=S.RESTORING)]
 
 
-def _shown(core: Core, event: r.Shown) -> list[Effect]:
+def _shown(core: Core, event: say.Shown) -> list[Effect]:
     core.frame, core.frames = event, core.frames + 1
     return [Draw(event, core.frames)]
 
 
-def _said(core: Core, event: r.Said) -> list[Effect]:
+def _said(core: Core, event: say.Said) -> list[Effect]:
     message = event.message
     if event.keep == "topology":
         core.frame = None
@@ -65,7 +67,7 @@ def _said(core: Core, event: r.Said) -> list[Effect]:
     return [Tell(message)]
 
 
-def _drag_failed(core: Core, event: r.Failed) -> list[Effect]:
+def _drag_failed(core: Core, event: say.Failed) -> list[Effect]:
     drag, core.drag = core.drag, None
     assert drag is not None
     told = Tell(error_message(event.sentence, "move", None), drag.window)
@@ -75,20 +77,20 @@ def _drag_failed(core: Core, event: r.Failed) -> list[Effect]:
 # ---- at the end of what was pending ----------------------------------------------------------------------------------
 
 
-def _done(core: Core, pending: Pending, event: r.Done) -> list[Effect]:
+def _done(core: Core, pending: Pending, event: say.Done) -> list[Effect]:
     if pending.document is not None:
         _commit(core, pending, pending.document, event)
     return [*done_messages(pending.window, pending.id), *_new_notes(core, event.notes), *core.rest()]
 
 
-def _commit(core: Core, pending: Pending, document: Document, event: r.Done) -> None:
+def _commit(core: Core, pending: Pending, document: Document, event: say.Done) -> None:
     """Puts what was done into the history."""
     if pending.what == "undo":
         core.history.undo()
     elif pending.what == "redo":
         core.history.redo()
     elif pending.what == "open":
-        made: r.Made = pending.extra
+        made: say.Made = pending.extra
         core.history = History(made.documents, made.now)
         core.began, core.told = core.clock(), set()
         core.saved = document if made.is_session else None
@@ -109,7 +111,7 @@ def _new_notes(core: Core, notes: tuple[str, ...]) -> list[Effect]:
     return effects
 
 
-def _made(core: Core, pending: Pending, event: r.Made) -> list[Effect]:
+def _made(core: Core, pending: Pending, event: say.Made) -> list[Effect]:
     told: list[Effect] = [Tell(notice(note)) for note in event.notes]
     if event.camera is not None:
         core.camera = event.camera
@@ -123,11 +125,11 @@ def _made(core: Core, pending: Pending, event: r.Made) -> list[Effect]:
     return [*told, *taken]
 
 
-def _asked(core: Core, pending: Pending, event: r.Asked) -> list[Effect]:
+def _asked(core: Core, pending: Pending, event: say.Asked) -> list[Effect]:
     return core.ask(event.sentence, event.choices)
 
 
-def _answered(core: Core, pending: Pending, event: r.Answered) -> list[Effect]:
+def _answered(core: Core, pending: Pending, event: say.Answered) -> list[Effect]:
     window = pending.window if pending.window is not None else 0
     if pending.what == "save":
         saving: Saving = pending.extra
@@ -135,7 +137,7 @@ def _answered(core: Core, pending: Pending, event: r.Answered) -> list[Effect]:
     return [Tell(event.data, window), *done_messages(window, pending.id), *core.rest()]
 
 
-def _failed(core: Core, pending: Pending, event: r.Failed) -> list[Effect]:
+def _failed(core: Core, pending: Pending, event: say.Failed) -> list[Effect]:
     told: list[Effect] = [Tell(error_message(event.sentence, pending.what, pending.id), pending.window)]
     if pending.what in ("back", "restore"):
         core.pending, core.state = None, S.FAILED
@@ -145,11 +147,15 @@ def _failed(core: Core, pending: Pending, event: r.Failed) -> list[Effect]:
     return [*told, *core.take("back", core.now, busy="goes back")]
 
 
-_AT_ONCE: Mapping[type, Callable[[Core, Any], list[Effect]]] = {r.Started: _started, r.Shown: _shown, r.Said: _said}
+_AT_ONCE: Mapping[type, Callable[[Core, Any], list[Effect]]] = {
+    say.Started: _started,
+    say.Shown: _shown,
+    say.Said: _said,
+}
 _ENDS: Mapping[type, Callable[[Core, Pending, Any], list[Effect]]] = {
-    r.Done: _done,
-    r.Made: _made,
-    r.Asked: _asked,
-    r.Answered: _answered,
-    r.Failed: _failed,
+    say.Done: _done,
+    say.Made: _made,
+    say.Asked: _asked,
+    say.Answered: _answered,
+    say.Failed: _failed,
 }

@@ -13,7 +13,8 @@ from .autosave import Keeper
 from .commands import CommandRefused, read_command
 from .containers import frame
 from .effects import Ask, Autosave, Deliver, Draw, Effect, StartEngine, Store, Tell, Wake
-from .engine.requests import Event, Open, Request, Shown
+from .engine.requests import Open, Request
+from .engine.saying import Event, Shown
 from .files import download_message, store, upload_command
 from .session import DesignSession
 from .telling import error_message

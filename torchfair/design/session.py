@@ -12,6 +12,7 @@ from .document import Document
 from .edits import EDITS
 from .effects import Draw, Effect, StartEngine, Tell, Wake
 from .engine import requests as r
+from .engine import saying as say
 from .events import heard
 from .folder import Folder
 from .history import History
@@ -116,7 +117,7 @@ class DesignSession:
 
     # ---- the engine ------------------------------------------------------------------------------------
 
-    def engine_said(self, event: r.Event) -> list[Effect]:
+    def engine_said(self, event: say.Event) -> list[Effect]:
         """What follows from what the engine says."""
         return heard(self._core, event)
 

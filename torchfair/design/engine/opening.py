@@ -18,7 +18,8 @@ from ..limits import MOST_VERTICES
 from ..questions import REPAIRS, answers
 from ..session_file import KEPT, SUFFIX, read_session
 from .recipes import faces_of
-from .requests import Asked, Event, Made, Open
+from .requests import Open
+from .saying import Asked, Event, Made
 
 
 def opened(request: Open) -> Event:

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from .requests import Event, Request
+from .requests import Request
+from .saying import Event
 
 
 class EngineProcess:

@@ -15,6 +15,7 @@ from ...shapes import EXAMPLES, SURFACES
 from ..containers import AT_REST, DRAGGING, JUMP
 from ..document import Document
 from . import requests as r
+from . import saying as say
 from .follower import Follower
 from .inbox import Inbox, Pipe
 from .measures import edge_bytes, live_numbers, view
@@ -38,7 +39,9 @@ class Worker:
         clock: Seconds.
     """
 
-    def __init__(self, pipe: Pipe, say: Callable[[r.Event], None], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, pipe: Pipe, say: Callable[[say.Event], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._say, self._clock = say, clock
         self._inbox = Inbox(pipe, self._watching)
         self._follower: Follower | None = None
@@ -48,7 +51,7 @@ class Worker:
 
     def run(self) -> None:
         """Until the other end of the pipe is gone. Nothing is computed while nothing has to be done."""
-        self._say(r.Started(0, (*EXAMPLES, *SURFACES)))
+        self._say(say.Started(0, (*EXAMPLES, *SURFACES)))
         while True:
             self.do(self.next())
 
@@ -65,7 +68,7 @@ class Worker:
         try:
             self._do(request)
         except _FAULTS as error:
-            self._say(r.Failed(request.serial, _sentence(error)))
+            self._say(say.Failed(request.serial, _sentence(error)))
 
     def _do(self, request: r.Request) -> None:
         if isinstance(request, r.Take):
@@ -78,11 +81,11 @@ class Worker:
             self._say(opened(request))
         elif isinstance(request, r.Remake):
             document, notes = remade(request.document, request.how, request.options)
-            self._say(r.Made(request.serial, (document,), notes=tuple(notes)))
+            self._say(say.Made(request.serial, (document,), notes=tuple(notes)))
         elif isinstance(request, r.Write):
-            self._say(r.Answered(request.serial, file_bytes(request.document, request.format)))
+            self._say(say.Answered(request.serial, file_bytes(request.document, request.format)))
         elif isinstance(request, r.Unroll):
-            self._say(r.Answered(request.serial, strips_message(request.document)))
+            self._say(say.Answered(request.serial, strips_message(request.document)))
 
     # ---- the mesh on the screen ------------------------------------------------------------------------
 
@@ -155,9 +158,9 @@ class Worker:
         follower = self._following()
         if follower.number != self._shown_number:
             message = topology_message(follower.document, follower.topology, follower.number)
-            self._say(r.Said(serial, "topology", message))
+            self._say(say.Said(serial, "topology", message))
             self._shown_number = follower.number
-        self._say(r.Said(serial, "settings", settings_message(follower.document)))
+        self._say(say.Said(serial, "settings", settings_message(follower.document)))
 
     def _show(self, serial: int, flags: int, count: int = 0) -> None:
         self._show_vertices(self._following().vertices, serial, flags, count)
@@ -167,7 +170,7 @@ class Worker:
         edges, scale = edge_bytes(vertices, follower.topology)
         origin, places = follower.document.origin, vertices.numpy().copy()
         self._framed = self._clock()
-        self._say(r.Shown(serial, follower.number, places, origin, edges, scale, flags, count))
+        self._say(say.Shown(serial, follower.number, places, origin, edges, scale, flags, count))
 
     def _measure(self, serial: int, *, rest: bool = False, now: bool = False) -> None:
         if rest or now or self._clock() - self._measured >= _BETWEEN_NUMBERS:
@@ -183,7 +186,7 @@ class Worker:
             numbers["deviation_back"] = follower.deviation.back(vertices, topology)
             numbers["promises"] = follower.promises()
         self._measured = self._clock()
-        self._say(r.Said(serial, "numbers", {"type": "numbers", "rest": rest, **numbers}))
+        self._say(say.Said(serial, "numbers", {"type": "numbers", "rest": rest, **numbers}))
         if rest:
             self._say_views(serial)
 
@@ -191,11 +194,11 @@ class Worker:
         follower = self._following()
         for name in self._views:
             message = view(name, follower.number, follower.vertices, follower.topology, follower.deviation)
-            self._say(r.Said(serial, f"view:{name}", message))
+            self._say(say.Said(serial, f"view:{name}", message))
 
     def _done(self, serial: int, *, stopped: bool) -> None:
         follower = self._following()
-        self._say(r.Done(serial, follower.places, stopped, follower.notes))
+        self._say(say.Done(serial, follower.places, stopped, follower.notes))
 
     def _watching(self, request: r.Watch) -> None:
         new = [name for name in request.views if name not in self._views]
