@@ -47,6 +47,10 @@ class SettingsError(TorchfairError):
     """A setting that is not among those allowed."""
 
 
+class DerivativeError(TorchfairError):
+    """The end of a solve has no derivative, or none that is asked for; the message names the condition that fails."""
+
+
 class SingularSystemError(TorchfairError):
     """A linear solver met a matrix that is singular, indefinite or not finite.
 

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import cached_property
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from . import _connectivity
+from ._loading import safe_to_load
 from ._names import PlacedError, few
+from ._tables import cached_table
 from .errors import MeshError, ShapeError
 
 _EAGER_TABLES = ("face_sizes", "is_triangular", "is_quadrangular", "faces_by_size", "next_corners", "valences",
                  "is_boundary_vertex")  # fmt: skip
 
 
+@safe_to_load
 @dataclass(frozen=True, eq=False, repr=False)
 class Topology:
     r"""Connectivity of an oriented manifold polygon mesh, with or without boundary.
@@ -85,6 +88,7 @@ class Topology:
         return cls.from_packed_faces(*_connectivity.pack_faces(faces), num_vertices)
 
     @classmethod
+    @torch.inference_mode(False)
     def from_packed_faces(
         cls, corners: _connectivity.Ints, face_offsets: _connectivity.Ints, num_vertices: int | None = None
     ) -> Topology:
@@ -108,6 +112,14 @@ class Topology:
         tensors = {name: torch.from_numpy(np.ascontiguousarray(a, np.int64)) for name, a in arrays.items()}
         return cls(num_vertices=half.num_vertices, **tensors)
 
+    def __getstate__(self) -> dict[str, object]:
+        """What copies and pickles hold: no tables that are made of it."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
     # ---- sizes -----------------------------------------------------------------------------------------
 
     @property
@@ -130,17 +142,17 @@ class Topology:
         """Where the index tensors live."""
         return self.edges.device
 
-    @cached_property
+    @cached_table
     def face_sizes(self) -> Tensor:
         """(F,) number of corners."""
         return self.face_offsets.diff()
 
-    @cached_property
+    @cached_table
     def is_triangular(self) -> bool:
         """Whether every face is a triangle."""
         return bool((self.face_sizes == 3).all())
 
-    @cached_property
+    @cached_table
     def is_quadrangular(self) -> bool:
         """Whether every face has four corners."""
         return bool((self.face_sizes == 4).all())
@@ -151,6 +163,14 @@ class Topology:
             f"Topology({kind} mesh: {self.num_vertices} vertices, {self.num_edges} edges "
             f"({self.num_edges - self.num_interior_edges} on the boundary), {self.num_faces} faces)"
         )
+
+    @cached_table
+    def fingerprint(self) -> str:
+        """Checksum of the faces and of V, equal where faces and corners are equal in equal order."""
+        digest = hashlib.sha256(str(self.num_vertices).encode())
+        for tensor in (self.corners, self.face_offsets):
+            digest.update(tensor.cpu().numpy().tobytes())
+        return digest.hexdigest()
 
     # ---- edges -----------------------------------------------------------------------------------------
 
@@ -164,7 +184,7 @@ class Topology:
         """(E-I, 2) vertices ``v, w``, the surface on the left."""
         return self.edges[self.num_interior_edges :]
 
-    @cached_property
+    @cached_table
     def triangles(self) -> Tensor:
         """(F, 3) faces of a triangle mesh.
 
@@ -174,7 +194,7 @@ class Topology:
         self.require_triangles()
         return self.corners.view(-1, 3)
 
-    @cached_property
+    @cached_table
     def edge_flaps(self) -> Tensor:
         """(I, 4) vertices ``v, w, a, b`` of each interior edge of a triangle mesh.
 
@@ -190,14 +210,14 @@ class Topology:
 
     # ---- faces -----------------------------------------------------------------------------------------
 
-    @cached_property
+    @cached_table
     def next_corners(self) -> Tensor:
         """(H,) the next corner of the same face, counterclockwise."""
         following = torch.arange(1, self.corners.shape[0] + 1, device=self.device)
         following[self.face_offsets[1:] - 1] = self.face_offsets[:-1]
         return following
 
-    @cached_property
+    @cached_table
     def faces_by_size(self) -> dict[int, tuple[Tensor, Tensor]]:
         """Faces grouped by number of corners, ``{k: (face numbers (n,), corners (n, k))}``."""
         groups: dict[int, tuple[Tensor, Tensor]] = {}
@@ -214,19 +234,19 @@ class Topology:
 
     # ---- vertices --------------------------------------------------------------------------------------
 
-    @cached_property
+    @cached_table
     def valences(self) -> Tensor:
         """(V,) number of edges at each vertex; 0 for isolated vertices."""
         return self.ring_offsets.diff()
 
-    @cached_property
+    @cached_table
     def is_boundary_vertex(self) -> Tensor:
         """(V,) bool."""
         mask = torch.zeros(self.num_vertices, dtype=torch.bool, device=self.device)
         mask[self.loop_vertices] = True
         return mask
 
-    @cached_property
+    @cached_table
     def rings_by_valence(self) -> dict[int, tuple[Tensor, Tensor]]:
         """Interior vertices grouped by valence, ``{k: (vertices (n,), ring (n, k))}``, rings counterclockwise."""
         interior = ~self.is_boundary_vertex & (self.valences > 0)
@@ -243,6 +263,7 @@ class Topology:
 
     # ---- moving and checking ---------------------------------------------------------------------------
 
+    @torch.inference_mode(False)
     def map_tensors(self, function: Callable[[Tensor], Tensor]) -> Topology:
         """A copy with ``function`` applied to every index tensor (used to move devices)."""
         changed = {f.name: function(getattr(self, f.name)) for f in fields(self) if f.name != "num_vertices"}

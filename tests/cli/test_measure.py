@@ -1,16 +1,18 @@
 from __future__ import annotations
 
+import csv
 import json
 import math
 from pathlib import Path
 
 import pytest
 import torch
-from helpers import cube
+from helpers import cube, wavy_grid
 
 from torchfair import Topology
 from torchfair.cli import main
-from torchfair.io import save_mesh
+from torchfair.geometry import face_areas
+from torchfair.io import load_mesh, save_mesh
 
 CUBE_OBJ = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
 
@@ -40,12 +42,17 @@ def test_json_is_one_strict_object(tmp_path: Path, capsys: pytest.CaptureFixture
     assert set(measured["worst_edges"][0]) == {
         "edge",
         "vertices",
+        "vertices_in_file",
+        "position",
+        "kind",
         "length",
         "dihedral_angle_degrees",
         "angle_variation",
     }
     assert measured["notes"] == []
-    others = {"file", "repairs", "notes", "worst_edges", "curvature_doubts", "units"}
+    others = {"file", "repairs", "notes", "worst_edges", "worst_panels", "curvature_doubts", "units", "verdict"}
+    edge = measured["worst_edges"][0]
+    assert edge["vertices_in_file"] == [vertex + 1 for vertex in edge["vertices"]]
     assert set(measured["units"]) == set(measured) - others
     assert measured["curvature_doubts"] == []
 
@@ -72,7 +79,45 @@ def test_table_has_values_units_and_worst_edges(tmp_path: Path, capsys: pytest.C
     heading = next(number for number, line in enumerate(lines) if line.startswith("worst edges"))
     rows = lines[heading + 2 :]
     assert len(rows) == 3
-    assert rows[0].split()[-3:] == ["1", "90", "1.5708"]
+    assert rows[0].split()[-6:-3] == ["1", "90", "1.5708"]
+    assert sorted(map(float, rows[0].split()[-3:]))[:2] in ([0.0, 0.0], [0.0, 0.5], [0.5, 1.0])
+    assert lines[1].startswith("verdict: E/C is ")
+
+
+def test_tables_have_a_row_for_each_panel_and_edge(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = file_of(cube(), tmp_path / "cube.obj")
+    panels, edges = tmp_path / "tables" / "p.csv", tmp_path / "tables" / "e.csv"
+    words = ["measure", path, "--panels", str(panels), "--edges", str(edges)]
+    assert main(words) == 0
+    rows = list(csv.DictReader(panels.read_text().splitlines()))
+    assert [row["panel"] for row in rows] == [str(number) for number in range(1, 7)]
+    assert {float(row["area"]) for row in rows} == {1.0}
+    assert {(row["class"], row["largest_kink_degrees"]) for row in rows} == {("planar", "90.0")}
+    rows = list(csv.DictReader(edges.read_text().splitlines()))
+    assert len(rows) == 12
+    assert {row["class"] for row in rows} == {"crease"}
+    assert min(int(row["from"]) for row in rows) == 1
+    assert max(int(row["to"]) for row in rows) == 8
+    energy = sum(
+        float(row["length"]) * 2 * math.sin(math.radians(float(row["dihedral_angle_degrees"])) / 2) for row in rows
+    )
+    assert energy == pytest.approx(12 * math.sqrt(2))
+    capsys.readouterr()
+    assert main(words) == 2
+    assert "--force" in capsys.readouterr().err
+    assert main([*words, "--force"]) == 0
+
+
+def test_tables_of_a_result(tmp_path: Path) -> None:
+    vertices, topology = wavy_grid(4, 4)
+    path = file_of((vertices, topology), tmp_path / "in.obj")
+    words = ["fair", path, "-o", str(tmp_path / "out.ply"), "--no-pictures", "--iterations", "2"]
+    assert main([*words, "--panels", str(tmp_path / "p.csv")]) in (0, 1)
+    made = load_mesh(tmp_path / "out.ply")
+    rows = list(csv.DictReader((tmp_path / "p.csv").read_text().splitlines()))
+    assert [int(row["panel"]) for row in rows] == list(range(9))
+    areas = face_areas(made.vertices, made.topology).tolist()
+    assert [float(row["area"]) for row in rows] == pytest.approx(areas)
 
 
 def test_repair_is_said_and_done(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -113,6 +113,22 @@ def test_the_report_of_another_mesh_is_not_replaced(folder: Folder, capsys: pyte
     assert folder.run("--force", "--results", str(folder.out), output="roof.ply") == 0  # there is no other any more
 
 
+def test_copies_of_a_folder_are_outputs_of_their_own(folder: Folder) -> None:
+    assert folder.run() == 0
+    shutil.copytree(folder.out, folder.path / "copy")
+    assert folder.run("--force", output="../copy/roof.obj") == 0
+
+
+def test_reports_on_meshes_of_one_name_do_not_replace_each_other(
+    folder: Folder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of outputs that share ``--results``."""
+    shared = ["--results", str(folder.path / "shared")]
+    assert folder.run(*shared) == 0
+    assert folder.run(*shared, "--force", output="more/roof.obj") == 2
+    assert f"is the report of {folder.out / 'roof.obj'}" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("taken", sorted(ALL - {"roof.one.png", "roof.two.png"}))
 def test_a_name_that_is_taken_meanwhile_is_left_alone(
     folder: Folder, taken: str, capsys: pytest.CaptureFixture[str]

@@ -27,7 +27,7 @@ def test_measures_are_lines_in_the_order_of_interest_with_changes_in_percent() -
     assert lines[0].split() == ["before", "after"]
     assert [line.split("  ")[0] for line in lines[1:]] == [
         "E",
-        "C, the floor of E",
+        "C (normal cycle, E is never below)",
         "smallest angle, degrees",
         "faces flipped",
         "largest distance of a handle from its target",

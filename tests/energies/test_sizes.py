@@ -19,7 +19,7 @@ from torchfair.energies import (
     total_mean_curvature,
     willmore_energy,
 )
-from torchfair.energies._unit import ordinary_extents, unit_of
+from torchfair.geometry._unit import ordinary_extents, unit_of
 
 Energy = Callable[[Tensor, Topology], Tensor]
 LENGTHS: list[Energy] = [

@@ -298,3 +298,31 @@ def test_refuses_wrong_shapes(quantity):
         quantity(vertices[1:], topology)
     with pytest.raises(ShapeError, match=r"got \(25, 3\) torch.int64"):
         quantity(vertices.long(), topology)
+
+
+@every_quantity
+@pytest.mark.parametrize("size", [2.0**-44, 2.0**44])
+def test_holds_for_any_size_in_single_precision(quantity, size):
+    """Squares of areas are beyond the range of float32: faces passed for degenerate, with no normals."""
+    vertices, topology = GENERIC["triangles"]()
+    single = vertices.float()
+    expected = quantity(single, topology).double() * size**quantity.power
+    found = quantity(size * single, topology).double()
+    torch.testing.assert_close(found, expected, rtol=1e-3, atol=1e-4 * float(expected.abs().max()))
+
+
+@every_quantity
+@pytest.mark.filterwarnings("ignore:geometry in torch:UserWarning")
+def test_leaves_half_precision_at_once(quantity):
+    vertices, topology = GENERIC["quads"]()
+    coarse = vertices.bfloat16()
+    with torch.autocast("cpu", torch.bfloat16):
+        found = quantity(coarse, topology)
+    assert found.dtype == torch.float32
+    assert torch.equal(found, quantity(coarse.float(), topology))
+
+
+def test_half_precision_is_warned_of():
+    vertices, topology = GENERIC["quads"]()
+    with pytest.warns(UserWarning, match=r"geometry in torch.float16: .*Keep vertices in float32"):
+        geometry.face_normals(vertices=vertices.half(), topology=topology)

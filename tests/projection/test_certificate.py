@@ -134,8 +134,20 @@ def test_the_last_ten_accepted_steps_count_or_as_many_as_there_were(steps: int, 
     ]
     result = ProjectionResult({}, Status.TIME_LIMIT, "", [], [], history, "dense", {})
     assert result.recent_fall == pytest.approx(fall)
-    expected = f"merit -{100.0 * fall:.2g} % in the last {min(steps, 10)} steps"
-    assert message_of(Status.TIME_LIMIT, history).endswith(expected)
+    expected = f"the last {min(steps, 10)} steps have lowered the merit by {100.0 * fall:.2g} %" if steps else "no step"
+    message = message_of(Status.TIME_LIMIT, history)
+    assert expected in message
+    assert "were refused" not in message  # half of them
+
+
+def test_that_most_steps_were_refused_is_said() -> None:
+    def message(refused: int) -> str:
+        taken = [True, *([False] * refused), *([True] * 4)]
+        history = [IterationRecord(n, 9.0 - n, 1.0, 1.0, 1.0, 0.1, on, 1, 0.0) for n, on in enumerate(taken)]
+        return message_of(Status.TIME_LIMIT, history)
+
+    assert "5 of 9 steps were refused" in message(5)
+    assert "were refused" not in message(4)
 
 
 def test_another_choice_is_refused() -> None:

@@ -11,6 +11,7 @@ from helpers import DOUBLE
 from torch import Tensor
 
 from torchfair.projection import ElementTerm, ProjectionSettings, guided_projection
+from torchfair.projection.damping import Damping
 from torchfair.projection.layout import State
 
 STEPS = ProjectionSettings(
@@ -48,6 +49,31 @@ def test_damping_falls_to_a_third_with_every_step_that_does_what_the_model_says(
         x *= expected[-1] / (1.0 + expected[-1])
         assert record.merit == pytest.approx(0.5 * x * x)
     assert [record.damping for record in result.history[1:]] == pytest.approx(expected)
+
+
+def test_damping_rises_by_what_a_step_overshot() -> None:
+    """A merit that rises by 400 times what was promised to fall: the best step is far shorter than half."""
+    damping = Damping(0.1, growth=2.0)
+    assert damping.rejected(-400.0).value == pytest.approx(4.0)
+    assert damping.rejected(-400.0).growth == damping.rejected().growth == 4.0
+    assert damping.rejected(-1e30).value == pytest.approx(1e3)
+    assert damping.shortened(2).value == pytest.approx(1.6)
+    for gain in (0.0, -1.0, -9.0, -math.inf, math.nan):
+        assert damping.rejected(gain).value == pytest.approx(0.2)
+    assert Damping(0.1, growth=1024.0).rejected(-400.0).value == pytest.approx(102.4)
+
+
+def test_far_overshooting_steps_are_given_up_after_few() -> None:
+    """A wall behind which the residual grows as a square, on the way to a far aim: doublings take seven refusals."""
+
+    def wall(x: Tensor) -> Tensor:
+        return torch.stack([x[0, 0] - 1.0, 1e4 * torch.relu(x[0, 0] - 1e-3) ** 2])
+
+    term = ElementTerm("wall", wall, [("x", torch.zeros(1, 1, dtype=torch.int64))])
+    result = guided_projection(at(0.0), [term], settings=replace(STEPS, initial_damping=1e-3, max_iterations=12))
+    refused = [record.accepted for record in result.history[1:]].index(True)
+    assert 1 <= refused <= 5
+    assert float(result.blocks["x"]) == pytest.approx(0.0027084, rel=1e-3)  # 2e8 (x - 0.001)^3 = 1 - x
 
 
 def test_damping_rises_ever_faster_while_steps_are_refused_and_starts_anew_after_one_that_is_taken() -> None:

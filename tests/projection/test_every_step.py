@@ -85,7 +85,7 @@ def test_a_step_is_taken_although_the_merit_rises() -> None:
     merits = [record.merit for record in result.history]
     assert merits == sorted(merits)
     assert merits[0] < merits[-1]
-    assert "merit +" in result.message
+    assert "raised the merit by" in result.message
     judged = guided_projection(start, [term], settings=replace(bold, step_policy="judged", max_iterations=50))
     assert abs(float(judged.blocks["x"])) < 1e-6
 

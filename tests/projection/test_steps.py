@@ -195,3 +195,23 @@ def test_the_gain_of_a_shortened_step_is_that_over_what_the_shortened_step_promi
     promised = 0.5 * (0.9**2 + 2.0**2) - 0.5 * ((0.9 + 0.5 * half) ** 2 + (2.0 + half) ** 2)
     actual = 0.5 * (0.9**2 + 2.0**2) - 0.5 * ((math.sqrt(1.0 + half) - 0.1) ** 2 + (2.0 + half) ** 2)
     assert result.history[1].gain == pytest.approx(actual / promised)
+
+
+def test_a_step_that_is_not_downhill_with_parts_held_back_is_shortened_as_a_whole() -> None:
+    """Two unknowns that have to go together: one may not go beyond 0.3, and the other alone would be wrong."""
+
+    def together(x: Tensor) -> Tensor:
+        return torch.stack([x[0, 0] - 1.0, 100.0 * (x[0, 0] - x[1, 0])])
+
+    def below(x: Tensor) -> Tensor:
+        return 1e-3 * torch.log(0.3 - x[0])
+
+    both, first = torch.tensor([[0, 1]]), torch.tensor([[0]])
+    terms = [ElementTerm("together", together, [("x", both)]), ElementTerm("below", below, [("x", first)])]
+    start = {"x": torch.zeros(2, 1, dtype=DOUBLE)}
+    settings = ProjectionSettings(initial_damping=1e-9, max_iterations=1, solver="dense")
+    result = guided_projection(start, terms, settings=settings)
+    assert result.history[1].accepted
+    x, y = result.blocks["x"].flatten().tolist()
+    assert 0.1 < x < 0.3
+    assert abs(x - y) < 1e-3

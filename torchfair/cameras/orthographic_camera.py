@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from .._loading import safe_to_load
 from .attributes import camera_rows, fill_attributes, positive_numbers, unit_directions
 from .camera import Camera
 from .fitting import check_frame, fit_windows, look_axes, points_to_fit
 
 
+@safe_to_load
 @dataclass(frozen=True, eq=False)
 class OrthographicCamera(Camera):
     """Parallel views, as from far away.

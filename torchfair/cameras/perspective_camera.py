@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from .._loading import safe_to_load
 from ..errors import TorchfairError
 from .attributes import camera_rows, fill_attributes, positive_numbers, unit_directions
 from .camera import Camera
@@ -14,6 +15,7 @@ from .fitting import check_frame, fit_eyes, look_axes, points_to_fit
 from .orthographic_camera import OrthographicCamera
 
 
+@safe_to_load
 @dataclass(frozen=True, eq=False)
 class PerspectiveCamera(Camera):
     """Views from eyes at finite distance.

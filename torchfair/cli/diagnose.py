@@ -14,10 +14,12 @@ from .inputs import add_repair, read_input
 from .reading import said_of
 from .several import add_inputs
 from .told_files import told_files, written_with_report
+from .views import LABELS, add_views, view_of
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
     from ..measuring import Diagnosis
+    from ..viewing import ViewDirection
 
 NAME = "torchfair diagnose"
 PICTURES = ("classes.png", "pyramids.png", "gauss_image.png")
@@ -65,6 +67,7 @@ def add_parser(subparsers: Any) -> None:
     )
     add("--vertex", action="append", default=[], metavar="VERTEX ...", help="draw the normal pyramids of these "
         f"vertices: {NUMBERS}, or 'near X Y Z'; by default of the worst, then of some of each class")  # fmt: skip
+    add_views(parser)
     add("--no-pictures", action="store_true", help="write no pictures")
     add("--force", action="store_true", help="replace files that exist")
     add_repair(parser)
@@ -122,7 +125,7 @@ def write(
     """Writes report and pictures, all or nothing; ``drawn`` vertices have their pyramids drawn."""
     with written_with_report(files, report, arguments):
         if len(files) > 1:
-            _draw(files[1:], mesh, diagnosis, report, drawn, force=arguments.force)
+            _draw(files[1:], mesh, diagnosis, report, drawn, view=view_of(arguments, mesh), force=arguments.force)
 
 
 def _draw(
@@ -132,19 +135,24 @@ def _draw(
     report: dict[str, Any],
     drawn: list[int],
     *,
+    view: ViewDirection | None,
     force: bool,
 ) -> None:
     from ..io import save_mesh
     from ..viewing.picture_gauss_image import picture_gauss_image
+    from ..viewing.picture_labels import FEW, picture_labels
     from ..viewing.picture_pyramids import picture_pyramids
     from ..viewing.picture_star_classes import picture_star_classes, star_class_colors
 
     vertices, topology, classes, crossings = mesh.vertices, mesh.topology, diagnosis.classes, diagnosis.crossings
-    overview, pyramids, sphere, colored = files
-    picture_star_classes(overview, vertices, classes, crossings, overwrite=force)
+    overview, pyramids, sphere, colored, *labels = files
+    picture_star_classes(overview, vertices, classes, crossings, view=view, overwrite=force)
     chosen = drawn or _instructive(diagnosis, report["worst_vertices"])
     picture_pyramids(pyramids, vertices, classes, crossings, chosen, names=mesh.names, overwrite=force)
     picture_gauss_image(sphere, vertices, topology, crossings, overwrite=force)
+    for path in labels:
+        shown = None if topology.num_vertices <= FEW else [row["vertex"] for row in report["worst_vertices"]]
+        picture_labels(path, vertices, topology, shown, names=mesh.names, view=view, overwrite=force)
     colors = star_class_colors(classes)
     save_mesh(colored, vertices, topology, overwrite=force, binary=True, colors=colors)
 
@@ -220,7 +228,7 @@ def _files(arguments: argparse.Namespace) -> list[Path]:
         if arguments.vertex:
             raise CommandError("--vertex draws a picture and needs a folder for it: --output FOLDER")
         return []
-    pictures = () if arguments.no_pictures else (*PICTURES, COLORED)
+    pictures = () if arguments.no_pictures else (*PICTURES, COLORED, *([LABELS] if arguments.label else []))
     return told_files(arguments, (REPORT, *pictures))
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from .chosen_vertices import ChosenVertices, faces_of_file
 from .edge_marks import MarkedOutputs, read_marks
+from .errors import CommandError
 from .inputs import (
     add_fixed,
     add_handles,
@@ -28,13 +29,14 @@ from .several import add_inputs
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
+    from ..io import PolygonMesh
 
 
 def _edges(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
     from ..viewing import picture_edges
 
     meshes = {"before": request.mesh.vertices, "after": result.vertices}
-    picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
+    picture_edges(path, meshes, [request.mesh.topology, result.topology], view=request.view, overwrite=overwrite)
 
 
 def _gauss_images(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
@@ -91,6 +93,7 @@ class FairCommand(JobCommand):
     def read(self, arguments: argparse.Namespace, settings: Any) -> Request:
         """See the base class."""
         mesh = read_input(arguments.input, arguments)
+        _refuse_soup(mesh, arguments)
         chosen = ChosenVertices(mesh)
         if _PLANAR in arguments and not isinstance(settings.planar, str):
             settings = replace(settings, planar=faces_of_file("--planar", settings.planar, mesh))
@@ -101,6 +104,14 @@ class FairCommand(JobCommand):
             "fixed": read_fixed(arguments, chosen),
         }
         return Request(mesh, options, notes=chosen.notes, marks=read_marks(mesh, arguments), settings=settings)
+
+
+def _refuse_soup(mesh: PolygonMesh, arguments: argparse.Namespace) -> None:
+    """Refuses meshes of several faces of which no two share an edge: E of these is 0 whatever they look like."""
+    if mesh.topology.num_faces > 1 and not mesh.topology.num_interior_edges:
+        welded = arguments.weld is not False
+        remedy = "try --weld TOLERANCE with a larger one" if welded else "--weld joins edges at the same place"
+        raise CommandError(f"no two faces of {arguments.input} share an edge, so that E is 0 whatever it is: {remedy}")
 
 
 COMMAND = FairCommand()

@@ -25,7 +25,9 @@ def _curvature(path: Path, request: Request, result: JobResult[Level], overwrite
     from ..viewing import picture_curvature
 
     start = ("start", request.mesh.vertices, request.mesh.topology)
-    picture_curvature(path, [start, ("result", result.vertices, result.topology)], overwrite=overwrite)
+    picture_curvature(
+        path, [start, ("result", result.vertices, result.topology)], view=request.view, overwrite=overwrite
+    )
 
 
 _STARTS = 6  # surfaces that are tried where nobody said where to start

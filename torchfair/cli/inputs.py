@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from .arguments import count
@@ -19,18 +20,36 @@ if TYPE_CHECKING:
     from ..topology import Topology
 
 
+_SURE = 1e-9  # of the sum of the sizes of its parts, that a volume differs from zero
+
+
 def read_input(name: str, arguments: argparse.Namespace | None = None) -> PolygonMesh:
     """A mesh file, read with the options of :func:`add_repair`; or a built-in example ``example:NAME``."""
     from ..io import PolygonMesh, load_mesh
 
     if not name.startswith("example:"):
-        return load_mesh(name, **({} if arguments is None else read_options(arguments)))
+        mesh = load_mesh(name, **({} if arguments is None else read_options(arguments)))
+        return replace(mesh, notes=(*mesh.notes, *_inside_out(mesh)))
     from ..shapes import EXAMPLES, builtin_mesh
 
     example = name.removeprefix("example:")
     if example not in EXAMPLES:
         raise CommandError(f"there is no example '{example}': choose {', '.join(sorted(EXAMPLES))}")
     return PolygonMesh(*builtin_mesh(example))
+
+
+def _inside_out(mesh: PolygonMesh) -> list[str]:
+    """Says so where a closed mesh has its faces turned inwards."""
+    from ..geometry import face_area_vectors, face_centres
+
+    topology = mesh.topology
+    if topology.num_edges > topology.num_interior_edges:
+        return []
+    vertices = mesh.vertices - mesh.vertices.mean(0)
+    volumes = (face_area_vectors(vertices, topology) * face_centres(vertices, topology)).sum(1) / 3.0
+    if float(volumes.sum()) >= -_SURE * float(volumes.abs().sum()):
+        return []
+    return ["the mesh is inside out: its faces are turned inwards, so that convex edges count as concave"]
 
 
 def add_reference(parser: argparse.ArgumentParser, words: str) -> None:

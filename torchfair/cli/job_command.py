@@ -17,6 +17,7 @@ from .parser import CommandParser
 from .reading import in_numbers_of, read_report
 from .request import Request, Writer
 from .summary import kept_lines, measures_table, missed_lines, note_lines, work_lines
+from .views import view_of
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult
@@ -103,6 +104,7 @@ class JobCommand(ABC):
         outputs = self.outputs(arguments)
         outputs.prepare()
         request = self.read(arguments, settings)
+        request.view = view_of(arguments, request.mesh)
         settings = request.settings or settings
         outputs.make_folders(request.mesh, getattr(arguments, "levels", 0))
         for warning in request.warnings:

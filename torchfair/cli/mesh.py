@@ -22,6 +22,7 @@ from .reading import in_numbers_of, read_report
 from .request import Request, Writer
 from .several import add_inputs
 from .summary import note_lines
+from .views import view_of
 
 if TYPE_CHECKING:
     from ..io import PolygonMesh
@@ -114,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
     with in_numbers_of(surface):
         made = _made(surface, arguments, settings)
     not_planar: list[str] = []
-    status, request = None, Request(surface, {})
+    status, request = None, Request(surface, {}, view=view_of(arguments, surface))
     with deferred_interrupts() as interrupts:
         if arguments.planar:
             made, not_planar, status = made_planar(made, surface, quiet=getattr(arguments, "quiet", False))
@@ -171,12 +172,13 @@ def draw_singular(path: Path, request: Request, result: Any, overwrite: bool) ->
     from ..viewing import picture_principal_edges, picture_principal_mesh
 
     if hasattr(result, "principal"):
-        picture_principal_edges(path, {"principal edges": (result.vertices, result.principal)}, overwrite=overwrite)
+        both = {"principal edges": (result.vertices, result.principal)}
+        picture_principal_edges(path, both, view=request.view, overwrite=overwrite)
         return
     points, indices = result.singular_points, result.singular_indices
     creases = result.creases.edges
     picture_principal_mesh(
-        path, result.vertices, result.topology, points, indices, creases=creases, overwrite=overwrite
+        path, result.vertices, result.topology, points, indices, creases=creases, view=request.view, overwrite=overwrite
     )
 
 
@@ -184,16 +186,21 @@ def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
     from ..viewing import picture_edges
 
     meshes = {"surface": request.mesh.vertices, "mesh": result.vertices}
-    picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
+    picture_edges(path, meshes, [request.mesh.topology, result.topology], view=request.view, overwrite=overwrite)
 
 
 def table(report: Mapping[str, Any]) -> list[str]:
     """What was measured on a principal mesh, one line for each."""
     rows = _ROWS | _CREASE_ROWS if report["crease_edges"] else _ROWS
     width = max(map(len, rows.values()))
-    lines = [f"{label:<{width}}  {_shown(report[name]):>10}" for name, label in rows.items() if name in report]
+    lines = [f"{label:<{width}}  {_told(name, report[name]):>10}" for name, label in rows.items() if name in report]
     found = ", ".join(f"{count} of index {index}" for index, count in report["singular"].items())
     return [*lines, f"{'singular points':<{width}}  {found or 'none':>10}"]
+
+
+def _told(name: str, value: float | None) -> str:
+    flat = name == "variation_over_curvature" and (value is None or value != value)
+    return "flat" if flat else _shown(value)
 
 
 def _shown(value: float | None) -> str:

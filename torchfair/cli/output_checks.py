@@ -34,11 +34,12 @@ def refuse_taken(paths: Sequence[Path], *, force: bool) -> None:
 
 
 def refuse_report_of_another(report: Path, mesh: Path) -> None:
-    """Refuses to replace the report of another output that is still there, such as one of another format."""
+    """Refuses to replace the report of another mesh that is still there, such as one of another format."""
     of = owner(report)
     if of is None:
         return
-    for other in (of, mesh.with_name(of.name)):
+    beside = os.path.realpath(report.parent) == os.path.realpath(mesh.parent)  # folders may have been copied or moved
+    for other in (mesh.with_name(of.name), *(() if beside else (of,))):
         if other.exists() and not _same(other, mesh):
             raise CommandError(f"{report} is the report of {other}: choose another name, or --results FOLDER")
 

@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import TorchfairError
+from .element_tables import add_tables, table_writers
 from .elsewhere import places
 from .errors import CommandError
 from .output_checks import make_folders, refuse_report_of_another, refuse_taken, refuse_unknown_format, remove
 from .output_names import FILES, OutputNames, listed, listed_in
 from .request import Report, Request, Writer
 from .result_files import save_result
+from .views import LABELS, add_views
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -24,6 +26,14 @@ if TYPE_CHECKING:
 _NOT_ASKED = ("run", "check", "name", "version", "quiet")
 _BYTES = 200  # of a vertex and its faces as text, about
 _BYTES_OF_OTHERS = 1_000_000  # of a report or a picture
+
+
+def draw_labels(path: Path, request: Request, result: Any, overwrite: bool) -> None:
+    """The mesh that was read, with the numbers that options take."""
+    from ..viewing import picture_labels
+
+    mesh, view = request.mesh, request.view
+    picture_labels(path, mesh.vertices, mesh.topology, names=mesh.names, view=view, overwrite=overwrite)
 
 
 class Outputs:
@@ -41,12 +51,15 @@ class Outputs:
         beside: Writers of what is written with the mesh, by end of the name.
         late: Writers of what :meth:`more` has made, beside the mesh, too.
         pictures, others: Writers of what is written at last, by end of the name.
+        tables: Writers of tables by path, which is asked for.
         force: Whether files may be replaced.
     """
 
     def __init__(self, arguments: argparse.Namespace, pictures: Mapping[str, Writer]) -> None:
         self.names, self.force = OutputNames.of(arguments.output, arguments.results), arguments.force
-        self.pictures: dict[str, Writer] = {} if arguments.no_pictures else dict(pictures)
+        drawn = {**pictures, **({LABELS: draw_labels} if getattr(arguments, "label", False) else {})}
+        self.pictures: dict[str, Writer] = {} if arguments.no_pictures else drawn
+        self.tables: dict[Path, Writer] = dict(table_writers(arguments))
         self.beside: dict[str, Writer] = {}
         self.late: dict[str, Writer] = {}
         self.others: dict[str, Writer] = {}
@@ -68,7 +81,7 @@ class Outputs:
         names = names or self.names
         ends = [*self.beside, *self.late]
         told = ["report.json", *self.pictures, *self.others]
-        return [names.output, *(names.beside(end) for end in ends), *(names.side(end) for end in told)]
+        return [names.output, *(names.beside(end) for end in ends), *(names.side(end) for end in told), *self.tables]
 
     # ---- before the job --------------------------------------------------------------------------------
 
@@ -117,6 +130,7 @@ class Outputs:
         """
         print("\n".join(lines), flush=True)
         rest = {self.names.side(end): writer for end, writer in (self.pictures | self.others).items()}
+        rest |= self.tables
         try:
             if request.interrupted:
                 raise KeyboardInterrupt
@@ -200,6 +214,8 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
         "or a folder; what belongs to it is named after it: NAME.report.json and others")  # fmt: skip
     add("--results", metavar="FOLDER", help="folder of NAME.report.json and all else (default: that of OUTPUT)")
     add("--no-pictures", action="store_true", help="write no pictures")
+    add_views(parser)
+    add_tables(parser, "the result")
     add("--force", action="store_true", help="replace files that exist, and remove pictures of the earlier run")
 
 

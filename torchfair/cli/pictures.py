@@ -16,7 +16,7 @@ def draw_before_after(path: Path, request: Request, result: JobResult[Level], ov
     from ..viewing import picture_before_after
 
     both = request.mesh.topology, result.topology
-    picture_before_after(path, request.mesh.vertices, result.vertices, both, overwrite=overwrite)
+    picture_before_after(path, request.mesh.vertices, result.vertices, both, view=request.view, overwrite=overwrite)
 
 
 def draw_edges(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
@@ -24,4 +24,4 @@ def draw_edges(path: Path, request: Request, result: JobResult[Level], overwrite
     from ..viewing import picture_edges
 
     meshes = {"start": request.mesh.vertices, "result": result.vertices}
-    picture_edges(path, meshes, [request.mesh.topology, result.topology], overwrite=overwrite)
+    picture_edges(path, meshes, [request.mesh.topology, result.topology], view=request.view, overwrite=overwrite)

@@ -58,7 +58,7 @@ def add_parser(subparsers: Any) -> None:
     add("--size", type=positive_count, default=256, metavar="PIXELS", help="pixels along a picture (default 256)")
     add("--frequency", type=positive_or_none, default=None, metavar="F", help="stripe pairs per unit of the mirrored "
         "direction (default: such that the smooth surface shows about four)")  # fmt: skip
-    add("--frames", type=count, default=36, metavar="N", help="pictures of the turntable, 0 for none (default 36)")
+    add("--frames", type=count, default=24, metavar="N", help="pictures of the turntable, 0 for none (default 24)")
     add("--no-pictures", action="store_true", help="write no pictures and no turntable")
     add("--force", action="store_true", help="replace files that exist")
     add_repair(parser)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from ..io import PolygonMesh
+    from ..viewing import ViewDirection
 
 
 @dataclass
@@ -28,6 +29,7 @@ class Request:
         report: Entries of the report beside those that all jobs have.
         missed: What was asked for beside the job and is not there, in words.
         interrupted: Whether the job was interrupted too late for that to change it, or what comes after it was.
+        view: From where pictures are taken; None for the usual direction.
     """
 
     mesh: PolygonMesh
@@ -40,6 +42,7 @@ class Request:
     report: dict[str, Any] = field(default_factory=dict)
     missed: list[str] = field(default_factory=list)
     interrupted: bool = False
+    view: ViewDirection | None = None
 
 
 Writer = Callable[[Path, Any, Any, bool], object]

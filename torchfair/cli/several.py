@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Protocol
 
 from .arguments import positive_count
+from .element_tables import refuse_one_table
 from .errors import CommandError
 from .exit_codes import EXIT_INTERRUPTED, EXIT_NOT_REACHED, EXIT_OK
 from .outcomes import Outcome, outcome_of
@@ -64,6 +65,7 @@ def run_inputs(arguments: argparse.Namespace, teller: Callable[[argparse.Namespa
     requests = _requests(arguments, inputs)
     if len(requests) == 1 and not getattr(arguments, "csv", False):
         return int(requests[0].run(requests[0]))
+    refuse_one_table(arguments)
     if hasattr(arguments, "check"):
         arguments.check(arguments)
     told = teller(arguments)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 LABELS = {
     "normal_variation": "E",
-    "total_absolute_curvature": "C, the floor of E",
+    "total_absolute_curvature": "C (normal cycle, E is never below)",
     "energy_over_curvature": "E/C",
     "angle_variation": "E'",
     "area": "area",
@@ -79,7 +79,7 @@ def measures_table(before: Mapping[str, float], after: Mapping[str, float]) -> l
     lines = [f"{'':<{width}}  {'before':>10}  {'after':>10}"]
     for name, label in zip(names, labels, strict=True):
         change = _percent(before[name], after[name]) if name in _IN_PERCENT else ""
-        lines.append(f"{label:<{width}}  {_number(before[name]):>10}  {_number(after[name]):>10}{change}")
+        lines.append(f"{label:<{width}}  {_told(name, before[name]):>10}  {_told(name, after[name]):>10}{change}")
     return lines
 
 
@@ -118,6 +118,10 @@ def note_lines(repairs: Sequence[str], notes: Sequence[str], missed: Sequence[st
 
 def _percent(before: float, after: float) -> str:
     return f"  {100.0 * (after / before - 1.0):+.1f} %" if before else ""
+
+
+def _told(name: str, value: float) -> str:
+    return "flat" if name == "energy_over_curvature" and math.isnan(value) else _number(value)
 
 
 def _number(value: float) -> str:

@@ -44,7 +44,7 @@ def _principal(path: Path, request: Request, result: Any, overwrite: bool) -> No
 
     vertices, edges = request.start
     meshes = {"start": (vertices, edges), "result": (result.vertices, result.levels[-1].principal)}
-    picture_principal_edges(path, meshes, overwrite=overwrite)
+    picture_principal_edges(path, meshes, view=request.view, overwrite=overwrite)
 
 
 def _labels(path: Path, request: Request, result: Any, overwrite: bool) -> None:

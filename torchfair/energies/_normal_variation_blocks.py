@@ -82,6 +82,7 @@ class Tables:
     scratch: Scratch
 
 
+@torch.inference_mode(False)
 def tables_of(topology: Topology) -> Tables:
     """The tables of a topology, remembered by it."""
     tables: Tables | None = topology.__dict__.get(_CACHE)

@@ -9,30 +9,32 @@ import torch
 from torch import Tensor
 from torch.autograd import Function
 
+from .._precision import in_single_at_least
+from .._tracing import is_recorded, is_transformed
 from ..geometry import dual_edge_lengths, edge_lengths
+from ..geometry._unit import in_its_unit
 from ..topology import Topology
 from ._normal_variation_blocks import faces_per_block, tables_of
 from ._normal_variation_kernel import energy_and_gradient
-from ._unit import unit_of
 
 
+@in_single_at_least
 def plain_terms(vertices: Tensor, topology: Topology) -> Tensor:
     """``l l*`` (*batch, I) of every interior edge, by differentiable functions of the geometry."""
     topology.check_vertices(vertices)
-    unit = unit_of(vertices)
-    vertices = vertices / unit[..., None, None]
+    vertices, unit = in_its_unit(vertices)
     lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
-    return lengths * dual_edge_lengths(vertices, topology) * unit[..., None]
+    return lengths * dual_edge_lengths(vertices, topology) * unit
 
 
 def fast_path_serves() -> bool:
-    """Whether :func:`fast_normal_variation` may be called here: not under torch.compile and torch.func.
+    """Whether :func:`fast_normal_variation` may be called here: not where it is recorded, nor under torch.func.
 
-    The compiler fuses the plain formula by itself. Transforms of torch.func compose with it in any order,
+    What is recorded must not be what was written into kept memory: ``torch.func.linearize`` gave back garbage.
+    Compilers fuse the plain formula by themselves. Transforms of torch.func compose with it in any order,
     but not with autograd functions: a nested ``jacfwd`` gets wrong numbers from them (PyTorch issue 197867).
     """
-    # torch.autograd.Function.apply asks the same question.
-    return not (torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active())
+    return not (is_recorded() or is_transformed())
 
 
 def fast_normal_variation(vertices: Tensor, edge_weights: Tensor | None, topology: Topology) -> Tensor:

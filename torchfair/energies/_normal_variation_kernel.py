@@ -25,10 +25,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from ..geometry._unit import bring_to_unit
 from ..geometry.normals import DEGENERACY
 from ._normal_variation_blocks import Block, Tables
 from ._normal_variation_memory import Memory
-from ._unit import bring_to_unit
 
 
 def energy_and_gradient(

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._loading import safe_to_load
+from .._precision import in_single_at_least
 from ..geometry import dihedral_angles, edge_lengths
+from ..geometry._unit import in_its_unit
 from ..topology import Topology
-from ._unit import unit_of
 from .base import EdgeEnergy, weigh
 
 
+@in_single_at_least
 def lengths_times_angles(vertices: Tensor, topology: Topology) -> Tensor:
     """Length times signed dihedral angle (*batch, I) of every interior edge, for meshes of any size."""
     topology.check_vertices(vertices)
-    unit = unit_of(vertices)
-    vertices = vertices / unit[..., None, None]
+    vertices, unit = in_its_unit(vertices)
     lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
-    return lengths * dihedral_angles(vertices, topology) * unit[..., None]
+    return lengths * dihedral_angles(vertices, topology) * unit
 
 
 def angle_variation_per_edge(vertices: Tensor, topology: Topology, edge_weights: Tensor | None = None) -> Tensor:
@@ -52,6 +54,7 @@ def angle_variation(vertices: Tensor, topology: Topology, edge_weights: Tensor |
     return angle_variation_per_edge(vertices, topology, edge_weights).sum(-1)
 
 
+@safe_to_load
 class AngleVariation(EdgeEnergy):
     """Module form of :func:`angle_variation`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
 

@@ -2,22 +2,45 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABCMeta, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar, Literal, get_args
 
 import torch
 from torch import Tensor, nn
 
-from ..errors import ShapeError
+from ..errors import ShapeError, TorchfairError
 from ..topology import Topology
 
+_MESH = "torchfair_mesh"  # key of the checksum in the metadata of a state
 
-class MeshModule(nn.Module):
+Reduction = Literal["none", "mean", "sum"]
+
+
+class _MadeForTraining(ABCMeta):
+    """Tensors that modules make for themselves are ordinary ones, even if they are made under ``inference_mode``."""
+
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+        with torch.inference_mode(False):
+            return super().__call__(*args, **kwargs)
+
+
+class MeshModule(nn.Module, metaclass=_MadeForTraining):
     """A module that holds a :class:`Topology` and takes it along when it is moved.
 
+    Subclasses define :meth:`per_mesh`.
+
     The topology is not a buffer: its index tensors stay integers under ``.half()`` or ``.type()``, survive
-    ``.to_empty()`` and stay out of the ``state_dict``. Modules copy and pickle with it.
+    ``.to_empty()`` and stay out of the ``state_dict``. Modules copy and pickle with it, and ``torch.load`` reads those
+    of torchfair with ``weights_only=True``.
+
+    Args:
+        topology: connectivity of all meshes that the module is called with.
+        reduction: what ``forward`` makes of the values (*batch,) of the meshes: ``"none"`` leaves them, ``"mean"`` and
+            ``"sum"`` give one number.
+
+    Raises:
+        TorchfairError: for an unknown reduction.
 
     Attributes:
         topology: who is beside whom, on the device of the module. It keeps its data when the module goes
@@ -29,9 +52,23 @@ class MeshModule(nn.Module):
     topology: Topology
     needs: ClassVar[tuple[str, ...]] = ("is_triangular", "faces_by_size")
 
-    def __init__(self, topology: Topology) -> None:
+    def __init__(self, topology: Topology, *, reduction: Reduction = "none") -> None:
         super().__init__()
+        if reduction not in get_args(Reduction):
+            raise TorchfairError(f'reduction must be "none", "mean" or "sum", got {reduction!r}')
+        self.reduction: Reduction = reduction
         self._set_topology(topology)
+
+    def per_mesh(self, vertices: Tensor) -> Tensor:
+        """Values (*batch,) of the meshes ``vertices`` (*batch, V, 3)."""
+        raise NotImplementedError(f"{type(self).__name__} defines neither per_mesh nor forward")
+
+    def forward(self, vertices: Tensor) -> Tensor:
+        """Values (*batch,) of ``vertices`` (*batch, V, 3), or their mean or sum."""
+        values = self.per_mesh(vertices)
+        if self.reduction == "none":
+            return values
+        return values.mean() if self.reduction == "mean" else values.sum()
 
     def _set_topology(self, topology: Topology) -> None:
         for name in self.needs:
@@ -47,20 +84,48 @@ class MeshModule(nn.Module):
             self._set_topology(self.topology.to(device))
         return self
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)  # type: ignore[no-untyped-call]
+        self._set_topology(self.topology)  # pickles leave its tables out
+
+    @property
+    def belongs_to_mesh(self) -> bool:
+        """Whether the state holds something about this one mesh, which says nothing about another."""
+        return False
+
+    def _save_to_state_dict(self, destination: Any, prefix: str, keep_vars: bool) -> None:
+        super()._save_to_state_dict(destination, prefix, keep_vars)
+        if self.belongs_to_mesh and hasattr(destination, "_metadata"):
+            destination._metadata[prefix[:-1]][_MESH] = self.topology.fingerprint
+
+    def _load_from_state_dict(
+        self, state_dict: Any, prefix: str, local_metadata: Any, strict: bool, missing: Any, other: Any, errors: Any
+    ) -> None:
+        super()._load_from_state_dict(state_dict, prefix, local_metadata, strict, missing, other, errors)
+        saved = local_metadata.get(_MESH)
+        if self.belongs_to_mesh and saved is not None and saved != self.topology.fingerprint:
+            errors.append(
+                f"{prefix[:-1] or type(self).__name__}: the state was saved for a mesh of other faces than those of "
+                f"{self.topology!r}, whose edges have other numbers. Make the module with the topology of that mesh."
+            )
+
     def extra_repr(self) -> str:
-        """The topology in words."""
-        return repr(self.topology)
+        """The topology and the reduction in words."""
+        reduction = "" if self.reduction == "none" else f", reduction={self.reduction!r}"
+        return repr(self.topology) + reduction
 
 
-class EdgeEnergy(MeshModule, ABC):
+class EdgeEnergy(MeshModule):
     """An energy that is a sum over interior edges, each term multiplied by the weight of its edge.
 
     Subclasses define :meth:`per_edge`.
 
     Args:
         topology: connectivity of all meshes that the module is called with.
-        edge_weights: (I,) or (*batch, I) floating factors of the terms, 1 if left out. A buffer: moves with
-            the module and is part of its ``state_dict``.
+        edge_weights: (I,) or (*batch, I) floating factors of the terms, 1 if left out. A buffer, or a parameter if it
+            is an ``nn.Parameter``: moves with the module and is part of its ``state_dict``, which is refused by a
+            module of another mesh.
+        reduction: see :class:`MeshModule`.
 
     Raises:
         ShapeError: if ``edge_weights`` does not end with one number per interior edge.
@@ -68,18 +133,47 @@ class EdgeEnergy(MeshModule, ABC):
 
     edge_weights: Tensor | None
 
-    def __init__(self, topology: Topology, edge_weights: Tensor | None = None) -> None:
-        super().__init__(topology)
+    def __init__(
+        self, topology: Topology, edge_weights: Tensor | None = None, *, reduction: Reduction = "none"
+    ) -> None:
+        super().__init__(topology, reduction=reduction)
         check_edge_weights(edge_weights, topology)
-        self.register_buffer("edge_weights", edge_weights)
+        register(self, "edge_weights", edge_weights)
+
+    @property
+    def belongs_to_mesh(self) -> bool:
+        """Whether there are weights of edges."""
+        return self.edge_weights is not None
+
+    def extra_repr(self) -> str:
+        """The topology, the reduction and the weights in words."""
+        return super().extra_repr() + in_words("edge_weights", self.edge_weights)
 
     @abstractmethod
     def per_edge(self, vertices: Tensor) -> Tensor:
         """Terms (*batch, I) of the interior edges, weights included; they sum to ``forward(vertices)``."""
 
-    def forward(self, vertices: Tensor) -> Tensor:
-        """Energy (*batch,) of ``vertices`` (*batch, V, 3)."""
+    def per_mesh(self, vertices: Tensor) -> Tensor:
+        """Energies (*batch,) of ``vertices`` (*batch, V, 3)."""
         return self.per_edge(vertices).sum(-1)
+
+
+def register(module: nn.Module, name: str, tensor: Tensor | None) -> None:
+    """Keeps a tensor in a module: a parameter as a parameter, any other as a buffer, fit for training."""
+    if tensor is not None and tensor.is_inference():
+        tensor = tensor.clone()
+    if isinstance(tensor, nn.Parameter):
+        module.register_parameter(name, tensor)
+    else:
+        module.register_buffer(name, tensor)
+
+
+def in_words(name: str, tensor: Tensor | None) -> str:
+    """What a repr says about a tensor of a module, nothing if there is none."""
+    if tensor is None:
+        return ""
+    kind = "trained " if isinstance(tensor, nn.Parameter) else ""
+    return f", {kind}{name} {tuple(tensor.shape)}"
 
 
 def check_edge_weights(edge_weights: Tensor | None, topology: Topology) -> None:

@@ -8,10 +8,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from .._loading import safe_to_load
 from ..geometry._ops import gather, scatter_sum
 from ..topology import Topology
 
 
+@safe_to_load
 class BoundaryExtrapolation(NamedTuple):
     """Which vertices take their density from which others; made by :func:`boundary_extrapolation`.
 
@@ -39,6 +41,7 @@ class BoundaryExtrapolation(NamedTuple):
         return torch.where(self.replaced, areas * filled, values)
 
 
+@torch.inference_mode(False)
 def boundary_extrapolation(topology: Topology) -> BoundaryExtrapolation:
     """Tables by which boundary vertices take the mean density (value over area) of their interior neighbours.
 

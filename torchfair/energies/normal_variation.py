@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._loading import safe_to_load
+from .._precision import in_single_at_least
 from ..topology import Topology
 from ._normal_variation_function import fast_normal_variation, fast_path_serves, plain_terms
 from .base import EdgeEnergy, check_edge_weights, weigh
 
 
+@in_single_at_least
 def normal_variation_per_edge(vertices: Tensor, topology: Topology, edge_weights: Tensor | None = None) -> Tensor:
     """Terms ``l l*`` of E for every interior edge, times its weight: (*batch, I).
 
@@ -17,6 +20,7 @@ def normal_variation_per_edge(vertices: Tensor, topology: Topology, edge_weights
     return weigh(plain_terms(vertices, topology), edge_weights, topology)
 
 
+@in_single_at_least
 def normal_variation(vertices: Tensor, topology: Topology, edge_weights: Tensor | None = None) -> Tensor:
     r"""Normal variation ``E = sum_e l_e l*_e`` over the interior edges (paper section 3).
 
@@ -65,6 +69,7 @@ def normal_variation(vertices: Tensor, topology: Topology, edge_weights: Tensor 
     return fast_normal_variation(vertices, edge_weights, topology)
 
 
+@safe_to_load
 class NormalVariation(EdgeEnergy):
     """Module form of :func:`normal_variation`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
 
@@ -72,6 +77,6 @@ class NormalVariation(EdgeEnergy):
         """Terms (*batch, I), weights included; see :func:`normal_variation_per_edge`."""
         return normal_variation_per_edge(vertices, self.topology, self.edge_weights)
 
-    def forward(self, vertices: Tensor) -> Tensor:
+    def per_mesh(self, vertices: Tensor) -> Tensor:
         """E (*batch,) of ``vertices`` (*batch, V, 3)."""
         return normal_variation(vertices, self.topology, self.edge_weights)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..errors import ShapeError
 from ..geometry._ops import cross, dot, map_faces, norm
 from ..geometry.areas import area_vector
@@ -15,6 +16,7 @@ from .base import weigh
 _FLATNESS = 4.0
 
 
+@in_single_at_least
 def normal_variation_derivative(
     vertices: Tensor, velocity: Tensor, topology: Topology, edge_weights: Tensor | None = None
 ) -> Tensor:

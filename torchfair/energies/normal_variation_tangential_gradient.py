@@ -5,11 +5,13 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..errors import ShapeError
 from ..topology import Topology
 from .normal_variation import normal_variation
 
 
+@in_single_at_least
 def normal_variation_tangential_gradient(
     vertices: Tensor, normals: Tensor, topology: Topology, edge_weights: Tensor | None = None
 ) -> Tensor:

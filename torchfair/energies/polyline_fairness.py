@@ -6,12 +6,13 @@ from collections.abc import Callable
 
 from torch import Tensor
 
+from .._loading import safe_to_load
 from ..errors import MeshError
 from ..geometry import second_differences
 from ..geometry.polylines import check_triples
 from ..polylines import straight_triples
 from ..topology import Topology
-from .base import MeshModule
+from .base import MeshModule, Reduction
 
 
 def polyline_fairness_per_triple(vertices: Tensor, topology: Topology, triples: Tensor | None = None) -> Tensor:
@@ -47,6 +48,7 @@ def polyline_fairness(vertices: Tensor, topology: Topology, triples: Tensor | No
     return polyline_fairness_per_triple(vertices, topology, triples).sum(-1)
 
 
+@safe_to_load
 class PolylineFairness(MeshModule):
     """Module form of :func:`polyline_fairness`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,).
 
@@ -54,6 +56,7 @@ class PolylineFairness(MeshModule):
         topology: connectivity of all meshes that the module is called with.
         triples: (N, 3) vertex numbers ``previous, vertex, next``; by default those of
             :func:`torchfair.straight_triples`.
+        reduction: see :class:`MeshModule`.
 
     Attributes:
         triples: the triples, on the device of the topology.
@@ -63,8 +66,8 @@ class PolylineFairness(MeshModule):
         MeshError: if a triple uses a vertex that the topology does not have.
     """
 
-    def __init__(self, topology: Topology, triples: Tensor | None = None) -> None:
-        super().__init__(topology)
+    def __init__(self, topology: Topology, triples: Tensor | None = None, *, reduction: Reduction = "none") -> None:
+        super().__init__(topology, reduction=reduction)
         triples = straight_triples(topology) if triples is None else triples
         check_triples(triples)
         outside = ((triples < 0) | (triples >= topology.num_vertices)).any(1).nonzero().squeeze(1)
@@ -84,6 +87,6 @@ class PolylineFairness(MeshModule):
         """Terms (*batch, N); see :func:`polyline_fairness_per_triple`."""
         return polyline_fairness_per_triple(vertices, self.topology, self.triples)
 
-    def forward(self, vertices: Tensor) -> Tensor:
+    def per_mesh(self, vertices: Tensor) -> Tensor:
         """Energy (*batch,) of ``vertices`` (*batch, V, 3)."""
         return self.per_triple(vertices).sum(-1)

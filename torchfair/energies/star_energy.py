@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import ClassVar, Literal, get_args
 
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..errors import TorchfairError
 from ..geometry import tangential_shape_operators, vertex_areas
+from ..geometry._unit import in_its_unit
 from ..geometry.tangential_shape_operator import Estimator, check_estimator
 from ..topology import Topology
-from ._unit import unit_of
-from .base import MeshModule
+from .base import MeshModule, Reduction
 from .boundary_extrapolation import BoundaryExtrapolation, boundary_extrapolation
 
 Boundary = Literal["open", "extrapolated"]
 
 
+@in_single_at_least
 def star_terms(
     norms: Callable[[Tensor], Tensor],
     vertices: Tensor,
@@ -41,16 +43,15 @@ def star_terms(
     """
     extrapolation = tables_for(boundary, topology)
     topology.check_vertices(vertices)
-    unit = unit_of(vertices)
-    vertices = vertices / unit[..., None, None]
+    vertices, unit = in_its_unit(vertices)
     unit = torch.ones_like(unit) if per_area else unit  # the rest has the unit of a length, or none
     values = norms(tangential_shape_operators(vertices, topology, estimator=estimator, sine=sine))
     if extrapolation is None and not per_area:
-        return values * unit[..., None]
+        return values * unit
     areas = vertex_areas(vertices, topology)
     if per_area:
         values = values / torch.where(areas > 0, areas, 1.0)
-    return (values if extrapolation is None else extrapolation.apply(values, areas)) * unit[..., None]
+    return (values if extrapolation is None else extrapolation.apply(values, areas)) * unit
 
 
 def tables_for(boundary: Boundary | BoundaryExtrapolation, topology: Topology) -> BoundaryExtrapolation | None:
@@ -62,7 +63,7 @@ def tables_for(boundary: Boundary | BoundaryExtrapolation, topology: Topology) -
     return None if boundary == "open" else boundary_extrapolation(topology)
 
 
-class StarEnergy(MeshModule, ABC):
+class StarEnergy(MeshModule):
     """An energy that is a sum over vertex stars of a norm of their shape operators.
 
     Subclasses define :meth:`norms`, and :attr:`per_area` if these are squares.
@@ -72,6 +73,7 @@ class StarEnergy(MeshModule, ABC):
         sine: see :func:`torchfair.energies.total_absolute_curvature`, also for the other two.
         estimator: of the shape operators.
         boundary: what to do about incomplete stars.
+        reduction: see :class:`MeshModule`.
 
     Attributes:
         per_area: whether norms are divided by the areas of the stars.
@@ -91,8 +93,9 @@ class StarEnergy(MeshModule, ABC):
         sine: bool = True,
         estimator: Estimator = "normal_cycle",
         boundary: Boundary = "open",
+        reduction: Reduction = "none",
     ) -> None:
-        super().__init__(topology)
+        super().__init__(topology, reduction=reduction)
         check_estimator(estimator)
         self.sine = sine
         self.estimator: Estimator = estimator
@@ -107,7 +110,7 @@ class StarEnergy(MeshModule, ABC):
     def extra_repr(self) -> str:
         """The topology and the choices in words."""
         estimator = f"normal_cycle, sine={self.sine}" if self.estimator == "normal_cycle" else self.estimator
-        return f"{self.topology!r}, {estimator}, {self.boundary} boundary"
+        return f"{super().extra_repr()}, {estimator}, {self.boundary} boundary"
 
     @property
     def boundary(self) -> Boundary:
@@ -131,6 +134,6 @@ class StarEnergy(MeshModule, ABC):
             per_area=self.per_area,
         )
 
-    def forward(self, vertices: Tensor) -> Tensor:
+    def per_mesh(self, vertices: Tensor) -> Tensor:
         """Energy (*batch,) of ``vertices`` (*batch, V, 3)."""
         return self.per_vertex(vertices).sum(-1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._loading import safe_to_load
 from ..geometry import nuclear_norms
 from ..geometry.tangential_shape_operator import Estimator
 from ..topology import Topology
@@ -76,6 +77,7 @@ def total_absolute_curvature(
     return terms.sum(-1)
 
 
+@safe_to_load
 class TotalAbsoluteCurvature(StarEnergy):
     """Module form of :func:`total_absolute_curvature`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._loading import safe_to_load
 from ..geometry import frobenius_norms
 from ..geometry.tangential_shape_operator import Estimator
 from ..topology import Topology
@@ -60,6 +61,7 @@ def total_frobenius_curvature(
     return terms.sum(-1)
 
 
+@safe_to_load
 class TotalFrobeniusCurvature(StarEnergy):
     """Module form of :func:`total_frobenius_curvature`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
 

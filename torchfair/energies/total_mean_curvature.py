@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._loading import safe_to_load
 from ..topology import Topology
 from .angle_variation import lengths_times_angles
 from .base import EdgeEnergy, weigh
@@ -40,6 +41,7 @@ def total_mean_curvature(vertices: Tensor, topology: Topology, edge_weights: Ten
     return total_mean_curvature_per_edge(vertices, topology, edge_weights).sum(-1)
 
 
+@safe_to_load
 class TotalMeanCurvature(EdgeEnergy):
     """Module form of :func:`total_mean_curvature`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
 

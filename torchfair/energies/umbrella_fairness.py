@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from torch import Tensor
 
+from .._loading import safe_to_load
 from ..geometry import umbrella_vectors
 from ..topology import Topology
 from .base import MeshModule
@@ -41,6 +42,7 @@ def umbrella_fairness(vertices: Tensor, topology: Topology) -> Tensor:
     return umbrella_fairness_per_vertex(vertices, topology).sum(-1)
 
 
+@safe_to_load
 class UmbrellaFairness(MeshModule):
     """Module form of :func:`umbrella_fairness`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
 
@@ -50,6 +52,6 @@ class UmbrellaFairness(MeshModule):
         """Terms (*batch, V); see :func:`umbrella_fairness_per_vertex`."""
         return umbrella_fairness_per_vertex(vertices, self.topology)
 
-    def forward(self, vertices: Tensor) -> Tensor:
+    def per_mesh(self, vertices: Tensor) -> Tensor:
         """Energy (*batch,) of ``vertices`` (*batch, V, 3)."""
         return self.per_vertex(vertices).sum(-1)

@@ -7,9 +7,11 @@ from typing import Literal, get_args
 
 from torch import Tensor
 
+from .._loading import safe_to_load
 from ..errors import TorchfairError
 from ..geometry.tangential_shape_operator import Estimator
 from ..topology import Topology
+from .base import Reduction
 from .boundary_extrapolation import BoundaryExtrapolation
 from .star_energy import Boundary, StarEnergy, star_terms
 
@@ -94,6 +96,7 @@ def willmore_energy(
     return terms.sum(-1)
 
 
+@safe_to_load
 class WillmoreEnergy(StarEnergy):
     """Module form of :func:`willmore_energy`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,).
 
@@ -103,6 +106,7 @@ class WillmoreEnergy(StarEnergy):
         sine: whether the normal cycle uses sines.
         estimator: of the shape operators.
         boundary: what to do about incomplete stars.
+        reduction: see :class:`MeshModule`.
 
     Raises:
         TorchfairError: for an unknown density, estimator or treatment of the boundary.
@@ -118,8 +122,9 @@ class WillmoreEnergy(StarEnergy):
         sine: bool = True,
         estimator: Estimator = "normal_cycle",
         boundary: Boundary = "open",
+        reduction: Reduction = "none",
     ) -> None:
-        super().__init__(topology, sine=sine, estimator=estimator, boundary=boundary)
+        super().__init__(topology, sine=sine, estimator=estimator, boundary=boundary, reduction=reduction)
         _squares(density)
         self.density: Density = density
 

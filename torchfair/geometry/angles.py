@@ -7,11 +7,14 @@ import math
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
+from ._any_size import of_any_size
 from ._ops import angle_of, cross, dot, gather, norm, scatter_sum
 from .areas import face_area_vectors
 
 
+@of_any_size(0)
 def corner_angles(vertices: Tensor, topology: Topology) -> Tensor:
     """Interior angle of the face at every corner, in radians.
 
@@ -44,6 +47,7 @@ def corner_angles(vertices: Tensor, topology: Topology) -> Tensor:
     return torch.where(reflex, 2 * math.pi - angles, angles)
 
 
+@in_single_at_least
 def angle_defects(vertices: Tensor, topology: Topology) -> Tensor:
     """Angle defect of every vertex: the integrated Gaussian curvature of its star, in radians.
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
+from ._any_size import of_any_size
 from ._ops import cross, map_faces, norm
 
 
+@in_single_at_least
 def face_area_vectors(vertices: Tensor, topology: Topology) -> Tensor:
     r"""Area vector of every face: normal to the face, as long as its area.
 
@@ -33,6 +36,7 @@ def face_area_vectors(vertices: Tensor, topology: Topology) -> Tensor:
     return map_faces(vertices, topology, area_vector)
 
 
+@of_any_size(2)
 def face_areas(vertices: Tensor, topology: Topology) -> Tensor:
     """Area of every face: the length of its area vector.
 

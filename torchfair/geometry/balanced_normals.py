@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from ..topology import Topology
+from ._any_size import of_any_size
 from ._ops import dot, gather, norm, scatter_sum
 from .lengths import edge_vectors
 from .normals import vertex_normals
@@ -16,6 +17,7 @@ from .tangent_basis import tangent_bases
 _STIFFNESS = 1e-3  # keeps normals where the edges of a star leave a direction open; edges have weight 1
 
 
+@of_any_size(0)
 def balanced_normals(vertices: Tensor, topology: Topology, *, sweeps: int = 4) -> Tensor:
     r"""Unit vertex normals ``u`` that lean as much forward as back along edges: ``(u_v + u_w) . (w - v)`` small.
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
 
 
+@in_single_at_least
 def face_centres(vertices: Tensor, topology: Topology) -> Tensor:
     """Mean of the corners of every face.
 

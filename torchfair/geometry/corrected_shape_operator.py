@@ -7,10 +7,12 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from ..topology import Topology
+from ._any_size import of_any_size
 from ._ops import cross, gather, scatter_sum
 from .balanced_normals import balanced_normals
 
 
+@of_any_size(1)
 def corrected_shape_operators(vertices: Tensor, topology: Topology, normals: Tensor | None = None) -> Tensor:
     r"""Shape operator of every vertex star as a 3x3 matrix, by interpolated corrected curvature measures.
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
 from ._ops import norm
 from .normals import adjacent_normals
 
 
+@in_single_at_least
 def dual_edge_lengths(vertices: Tensor, topology: Topology) -> Tensor:
     r"""Length ``l* = |n - n'|`` of every interior edge in the Gauss image, dimensionless.
 

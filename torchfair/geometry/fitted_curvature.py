@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from .._numbers import check_count
+from .._precision import in_single_at_least
 from ..errors import ShapeError, TorchfairError
 from ..topology import Topology
 from ._height_fits import Heights, fitted_heights
@@ -101,6 +102,7 @@ class FittedCurvature:
         return bases @ self.operators @ bases.mT
 
 
+@in_single_at_least
 def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patches | None = None) -> FittedCurvature:
     r"""Normal and shape operator of the surface at every vertex, by polynomials over rings of vertices.
 
@@ -146,6 +148,7 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
     return FittedCurvature(normals, operators, doubts, scales, patches.rings)
 
 
+@in_single_at_least
 def rings_for_noise(vertices: Tensor, topology: Topology) -> int:
     """Rings that :func:`fitted_curvature` needs in the noise of a mesh: 2 without, at most 12.
 

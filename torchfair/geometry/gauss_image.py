@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
 from .normals import face_normals
 
@@ -23,6 +24,7 @@ class GaussImage(NamedTuple):
     arcs: Tensor
 
 
+@in_single_at_least
 def gauss_image(vertices: Tensor, topology: Topology) -> GaussImage:
     """The Gauss image: the mesh's face normals on the unit sphere, joined across interior edges.
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
+from ._any_size import of_any_size
 from ._ops import norm
 
 
+@in_single_at_least
 def edge_vectors(vertices: Tensor, topology: Topology) -> Tensor:
     r"""Vector ``w - v`` along every edge ``(v, w)``, boundary edges included.
 
@@ -32,6 +35,7 @@ def edge_vectors(vertices: Tensor, topology: Topology) -> Tensor:
     return vertices.index_select(-2, w) - vertices.index_select(-2, v)
 
 
+@of_any_size(1)
 def edge_lengths(vertices: Tensor, topology: Topology) -> Tensor:
     """Length of every edge, boundary edges included.
 

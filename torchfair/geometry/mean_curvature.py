@@ -6,10 +6,12 @@ import torch
 from torch import Tensor
 
 from ..topology import Topology
+from ._any_size import of_any_size
 from ._ops import cross, face_groups, gather, scatter_sum
 from .normals import unit_normal
 
 
+@of_any_size(1)
 def mean_curvature_vectors(vertices: Tensor, topology: Topology) -> Tensor:
     r"""Mean-curvature vector of every vertex, integrated over its star.
 

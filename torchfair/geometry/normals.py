@@ -5,7 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
+from ._any_size import of_any_size
 from ._ops import dot, gather, map_faces, norm, scatter_sum
 from .angles import corner_angles
 from .areas import area_vector
@@ -14,6 +16,7 @@ DEGENERACY = 4.0
 """A face is degenerate if ``|A_f| <= DEGENERACY * eps * (sum of its squared edge lengths)``."""
 
 
+@of_any_size(0)
 def face_normals(vertices: Tensor, topology: Topology) -> Tensor:
     r"""Unit normal of every face: its area vector divided by its area.
 
@@ -29,8 +32,8 @@ def face_normals(vertices: Tensor, topology: Topology) -> Tensor:
         topology: connectivity; any polygons, mixed.
 
     Returns:
-        (*batch, F, 3), length 1 or (degenerate faces) 0. Squared areas must be within the range of the
-        dtype: edges between 1e-9 and 1e9 in float32.
+        (*batch, F, 3), length 1 or (degenerate faces) 0, for meshes of any size. Beside parts 1e9 times as large, in
+        float32, small faces pass for degenerate.
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
@@ -39,6 +42,7 @@ def face_normals(vertices: Tensor, topology: Topology) -> Tensor:
     return map_faces(vertices, topology, unit_normal)
 
 
+@in_single_at_least
 def degenerate_faces(vertices: Tensor, topology: Topology) -> Tensor:
     """Mask (*batch, F) of the faces without a normal, as defined at :func:`face_normals`.
 
@@ -52,6 +56,7 @@ def degenerate_faces(vertices: Tensor, topology: Topology) -> Tensor:
     return (face_normals(vertices, topology) == 0).all(-1)
 
 
+@in_single_at_least
 def vertex_normals(vertices: Tensor, topology: Topology) -> Tensor:
     """Unit normal of every vertex: the mean of its face normals weighted by the corner angles.
 
@@ -75,6 +80,7 @@ def vertex_normals(vertices: Tensor, topology: Topology) -> Tensor:
     return normalise(total, 64 * torch.finfo(vertices.dtype).eps)
 
 
+@in_single_at_least
 def adjacent_normals(vertices: Tensor, topology: Topology) -> tuple[Tensor, Tensor, Tensor]:
     """Normals of the two faces of every interior edge.
 

@@ -6,10 +6,12 @@ import torch
 from torch import Tensor
 
 from ..topology import Topology
+from ._any_size import of_any_size
 from ._ops import dot, gather, scatter_sum
 from .normals import face_normals
 
 
+@of_any_size(0)
 def offset_directions(vertices: Tensor, topology: Topology) -> Tensor:
     """Vectors x along which vertices move so that all faces move by the same distance: ``n_f . x = 1`` around each.
 
@@ -42,6 +44,7 @@ def offset_directions(vertices: Tensor, topology: Topology) -> Tensor:
     return directions.to(vertices.dtype)
 
 
+@of_any_size(0)
 def conical_deviations(vertices: Tensor, topology: Topology) -> Tensor:
     """How far every vertex is from being conical: the share by which its faces miss the distance of the best offset.
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
 from ._ops import cross, dot, map_faces, norm
 from .normals import DEGENERACY
 
 
+@in_single_at_least
 def planarity(vertices: Tensor, topology: Topology) -> Tensor:
     r"""Relative deviation of every face from planarity: diagonal distance divided by the mean edge of the face.
 

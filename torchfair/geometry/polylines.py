@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..errors import ShapeError
 from ._ops import gather
 
 
+@in_single_at_least
 def second_differences(vertices: Tensor, triples: Tensor) -> Tensor:
     """Second differences ``v_prev - 2 v + v_next`` of consecutive vertices on polylines.
 

@@ -6,6 +6,7 @@ from typing import Literal, get_args
 
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..errors import TorchfairError
 from ..topology import Topology
 from ._principal_frames import principal_frames
@@ -20,6 +21,7 @@ from .vertex_areas import vertex_areas
 CurvatureEstimator = Literal["fitted"] | Estimator
 
 
+@in_single_at_least
 def principal_values(
     vertices: Tensor,
     topology: Topology,
@@ -56,6 +58,7 @@ def principal_values(
     return eigenvalues(tangential_shape_operators(vertices, topology, estimator=estimator, sine=sine))
 
 
+@in_single_at_least
 def principal_directions(
     vertices: Tensor,
     topology: Topology,

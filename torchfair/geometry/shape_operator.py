@@ -6,12 +6,14 @@ import torch
 from torch import Tensor
 
 from ..topology import Topology
+from ._any_size import of_any_size
 from ._ops import cross, scatter_sum, unit
 from .dihedral import dihedral_angles
 from .lengths import edge_vectors
 from .normals import adjacent_normals
 
 
+@of_any_size(1)
 def shape_operators(vertices: Tensor, topology: Topology, *, sine: bool = True) -> Tensor:
     r"""Shape operator of every vertex star as a 3x3 matrix, integrated over the star (paper section 5.3).
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
 from ._ops import gather, scatter_sum
 from .normals import face_normals, normalise
 
 
+@in_single_at_least
 def star_normals(vertices: Tensor, topology: Topology) -> Tensor:
     """Unit vector along the plain sum of the face normals around every vertex (paper section 5.3, item 6).
 

@@ -8,6 +8,7 @@ from torch import Tensor
 
 from ..errors import TorchfairError
 from ..topology import Topology
+from ._any_size import of_any_size
 from .corrected_shape_operator import corrected_shape_operators
 from .shape_operator import shape_operators
 from .star_normals import star_normals
@@ -16,6 +17,7 @@ from .tangent_basis import tangent_bases
 Estimator = Literal["normal_cycle", "corrected"]
 
 
+@of_any_size(1)
 def tangential_shape_operators(
     vertices: Tensor, topology: Topology, *, estimator: Estimator = "normal_cycle", sine: bool = True
 ) -> Tensor:

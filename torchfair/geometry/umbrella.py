@@ -5,11 +5,13 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..topology import Topology
 from ._ops import scatter_sum
 from .lengths import edge_vectors
 
 
+@in_single_at_least
 def umbrella_vectors(vertices: Tensor, topology: Topology, *, include_boundary: bool = False) -> Tensor:
     r"""Umbrella vector of every vertex: the mean of its neighbours minus the vertex (Kobbelt et al. 1998).
 

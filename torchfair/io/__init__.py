@@ -24,4 +24,5 @@ from .reading import load_mesh as load_mesh
 from .report import versions as versions
 from .report import write_report as write_report
 from .rhino_parts import RhinoParts as RhinoParts
+from .writing import numbers_from as numbers_from
 from .writing import save_mesh as save_mesh

@@ -24,6 +24,11 @@ from .rhino import write_rhino
 from .rhino_parts import RhinoParts
 
 
+def numbers_from(path: str | os.PathLike[str]) -> int:
+    """What a format calls its first vertex and face: 1 in OBJ files, 0 in others."""
+    return 1 if Path(path).suffix.lower() == ".obj" else 0
+
+
 def save_mesh(
     path: str | os.PathLike[str],
     vertices: Tensor,

@@ -13,7 +13,6 @@ from torch import Tensor
 from .. import energies, geometry
 from .._graph import count_components
 from .._one_mesh import one_mesh
-from ..errors import ShapeError
 from ..topology import Topology
 
 Unit = Literal["length", "area", "1 / length", "degrees", "dimensionless"]
@@ -50,25 +49,6 @@ class Quantity:
     group: str
 
 
-@dataclass(frozen=True)
-class EdgeMeasures:
-    """One edge.
-
-    Attributes:
-        edge: its number in the topology.
-        vertices: numbers of its ends.
-        length: in the unit of the vertices.
-        dihedral_angle_degrees: signed, positive where convex.
-        angle_variation: ``l |a|``, in the unit of the vertices.
-    """
-
-    edge: int
-    vertices: tuple[int, int]
-    length: float
-    dihedral_angle_degrees: float
-    angle_variation: float
-
-
 def measure_mesh(vertices: Tensor, topology: Topology) -> list[Quantity]:
     """All quantities of one mesh: counts, energies, energies per area, shape.
 
@@ -90,33 +70,6 @@ def measure_mesh(vertices: Tensor, topology: Topology) -> list[Quantity]:
     """
     vertices = one_mesh(vertices, topology)
     return [*_counts(vertices, topology), *_energies(vertices, topology), *_shape(vertices, topology)]
-
-
-def worst_edges(vertices: Tensor, topology: Topology, count: int) -> list[EdgeMeasures]:
-    """The ``count`` interior edges with the largest ``l |a|``, largest first, ties by edge number.
-
-    Args:
-        vertices: positions ``(V, 3)`` in any length unit.
-        topology: connectivity; any polygons, mixed.
-        count: at most so many, 0 or more.
-
-    Raises:
-        ShapeError: if ``vertices`` are not one mesh that fits the topology, or ``count`` is negative.
-    """
-    vertices = one_mesh(vertices, topology)
-    if count < 0:
-        raise ShapeError("count", "0 or more", count)
-    values = energies.angle_variation_per_edge(vertices, topology)
-    chosen = values.argsort(descending=True, stable=True)[:count]
-    columns = (
-        chosen,
-        topology.interior_edges[chosen],
-        geometry.edge_lengths(vertices, topology)[chosen],
-        geometry.dihedral_angles(vertices, topology)[chosen].rad2deg(),
-        values[chosen],
-    )
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    return [EdgeMeasures(edge, (ends[0], ends[1]), *numbers) for edge, ends, *numbers in rows]
 
 
 def _counts(vertices: Tensor, topology: Topology) -> list[Quantity]:

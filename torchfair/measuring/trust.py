@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import torch
 from torch import Tensor
 
 from ..energies import normal_variation, total_absolute_curvature
@@ -14,7 +15,13 @@ from ..topology import Topology
 
 _LARGEST_RATIO = 3.0  # of E to C: good meshes have 1 to 2, those whose edges cross ridges 2.5
 LARGEST_DIHEDRAL = 150.0  # degrees
+_ROUNDING = 1e-7
 _FLAT = 0.02  # of the root of the area: E of meshes that are flat to rounding
+
+
+def is_flat(energy: float, area: float) -> bool:
+    """Whether an E or E' is no more than rounding on a mesh of that area."""
+    return energy <= _ROUNDING * math.sqrt(area)
 
 
 def explained_variation(curvature: float, area: float) -> float:
@@ -39,8 +46,21 @@ def fold_measures(vertices: Tensor, topology: Topology) -> dict[str, float]:
         "normal_variation": float(normal_variation(vertices, topology)),
         "area": area,
         "largest_dihedral_angle_degrees": math.degrees(float(angles.max())) if angles.numel() else 0.0,
-        "self_intersections": len(self_intersections(vertices, topology)),
+        "self_intersections": count_meetings(vertices, topology),
     }
+
+
+def count_meetings(vertices: Tensor, topology: Topology) -> int:
+    """Pairs of faces that run through each other, see :func:`torchfair.self_intersections`.
+
+    Faces that only lie side by side without being joined, with one or two corners at the same places, are left out:
+    they are neighbours in an unwelded mesh.
+    """
+    pairs = self_intersections(vertices, topology)
+    _, places = torch.unique(vertices.detach(), dim=0, return_inverse=True)
+    corners, offsets = places[topology.corners].tolist(), topology.face_offsets.tolist()
+    rings = [[set(corners[offsets[face] : offsets[face + 1]]) for face in pair] for pair in pairs.tolist()]
+    return sum(len(one & other) not in (1, 2) for one, other in rings)
 
 
 def curvature_doubts(measures: Mapping[str, float]) -> list[str]:

@@ -45,6 +45,7 @@ class Outcome:
         size: Largest change of an unknown.
         short: Whether the step is below ``step_tolerance``, or promises a fall that cannot be computed.
         accepted: Whether it was taken.
+        halvings: How often it was halved as a whole.
     """
 
     damping: Damping
@@ -52,6 +53,7 @@ class Outcome:
     size: float
     short: bool
     accepted: bool
+    halvings: int = 0
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ class Course:
         if not outcome.accepted and settings.takes_every_step:
             return replace(self, iteration=iteration, last=outcome, status=Status.DIVERGED)
         if not outcome.accepted:
-            damping = outcome.damping.rejected()
+            damping = outcome.damping.rejected(outcome.gain)
             suspected = damping.exhausted or (outcome.short and not self.doubted)
             return Course(
                 self.standing,
@@ -118,7 +120,7 @@ class Course:
         fall = (self.merit - standing.merit) / self.merit
         moved = Course(
             standing,
-            outcome.damping.accepted(outcome.gain),
+            outcome.damping.shortened(outcome.halvings) if outcome.halvings else outcome.damping.accepted(outcome.gain),
             self.accuracy,
             iteration,
             (*self.falls, fall)[-settings.patience_when_damped * settings.patience :],

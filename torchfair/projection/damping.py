@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 LARGEST = 1e20
 SMALLEST = 1e-60  # from far starts the largest stiffness met is many powers of ten above that at the minimum
 _FASTEST_FALL = 1.0 / 3.0
+_OVERSHOT, _FASTEST_RISE = 10.0, 1e4
 
 
 @dataclass(frozen=True)
@@ -25,9 +27,19 @@ class Damping:
         """After an accepted step whose actual over predicted decrease is ``gain``."""
         return Damping(max(self.value * max(_FASTEST_FALL, 1.0 - (2.0 * min(gain, 1.0) - 1.0) ** 3), SMALLEST))
 
-    def rejected(self) -> Damping:
-        """After a rejected step or a singular system."""
-        return Damping(self.value * self.growth, 2.0 * self.growth)
+    def shortened(self, halvings: int) -> Damping:
+        """After an accepted step that had to be halved so often: what keeps the next one as short, about."""
+        return Damping(self.value * 4.0**halvings)
+
+    def rejected(self, gain: float = 0.0) -> Damping:
+        """After a rejected step of that ``gain``, or a singular system.
+
+        A merit that rises by many times what was promised to fall says that the step is far too long: on a parabola
+        the best one is ``1 / (2 - gain)`` as long. Waiting for doublings would cost a solve each. A tenth of that is
+        made up at once: all of it leads to runs of short steps, which are taken for the end.
+        """
+        overshot = min(-gain / _OVERSHOT, _FASTEST_RISE) if math.isfinite(gain) and gain < -_OVERSHOT else 0.0
+        return Damping(self.value * max(self.growth, overshot), 2.0 * self.growth)
 
     @property
     def exhausted(self) -> bool:
@@ -43,6 +55,6 @@ class ConstantDamping(Damping):
         """Itself, whatever the step gained."""
         return self
 
-    def rejected(self) -> ConstantDamping:
+    def rejected(self, gain: float = 0.0) -> ConstantDamping:
         """After a singular system."""
         return ConstantDamping(self.value * self.growth, 2.0 * self.growth)

@@ -12,17 +12,20 @@ if TYPE_CHECKING:
     from .state import ProjectionState
 
 _RECENT = 10  # steps
+_FEW = 5  # steps, of which nothing is said
 
 
 class Status(enum.Enum):
     """Why the iteration ended. ``message`` says what it means and what to do about it."""
 
-    STEP_TOLERANCE = "steps are shorter than step_tolerance and an undamped one promises no more: converged"
-    GRADIENT_TOLERANCE = "the gradient is smaller than gradient_tolerance: converged"
-    MERIT_TOLERANCE = "the merit no longer falls by more than merit_tolerance and none is promised: converged"
-    ZERO_MERIT = "every residual is zero, as far as step_tolerance tells: converged"
+    STEP_TOLERANCE = "converged: steps are shorter than step_tolerance, and longer ones would not lower the merit"
+    GRADIENT_TOLERANCE = "converged: the gradient is smaller than gradient_tolerance"
+    MERIT_TOLERANCE = (
+        "converged: the merit falls by less than merit_tolerance in a step, and no other step would lower it"
+    )
+    ZERO_MERIT = "converged: there is nothing left to lower, every residual is zero (to step_tolerance)"
     SETTLED = (
-        "the merit no longer falls by more than merit_tolerance, but this was not found to be a minimum: not converged"
+        "not converged: the merit falls by less than merit_tolerance in a step, but other steps would lower it more"
     )
     MAX_ITERATIONS = "max_iterations reached: allow more iterations, or accept the result"
     TIME_LIMIT = "time_limit reached: allow more time, or accept the result"
@@ -169,10 +172,32 @@ def message_of(status: Status, history: list[IterationRecord], detail: str = "")
     """What a status means, and how near a minimum the last state is."""
     parts = [status.value, *([detail] if detail else [])]
     if history and status is not Status.ZERO_MERIT:
-        gradient, fall = history[-1].gradient, 100.0 * _recent_fall(history)
-        steps = min(sum(record.accepted for record in history) - 1, _RECENT)
-        parts.append(f"scaled gradient {gradient:.1e} (0 at a minimum), merit {-fall:+.2g} % in the last {steps} steps")
+        parts += [_nearness(history), *_refusals(history)]
     return "; ".join(parts)
+
+
+def _nearness(history: list[IterationRecord]) -> str:
+    """How fast the merit fell at last, and how steep it is."""
+    gradient, fall = history[-1].gradient, 100.0 * _recent_fall(history)
+    steps = min(sum(record.accepted for record in history) - 1, _RECENT)
+    steep = f"scaled gradient {gradient:.1e} (0 at a minimum)"
+    if steps < 1:
+        return f"no step has lowered the merit; {steep}"
+    words = "1 step has" if steps == 1 else f"{steps} steps have"
+    way = "lowered" if fall >= 0.0 else "raised"
+    return f"the last {words} {way} the merit by {abs(fall):.2g} %; {steep}"
+
+
+def _refusals(history: list[IterationRecord]) -> list[str]:
+    """Says so where most steps were refused."""
+    steps = len(history) - 1
+    refused = sum(not record.accepted for record in history[1:])
+    if steps < _FEW or refused <= steps / 2:
+        return []
+    return [
+        f"{refused} of {steps} steps were refused, since they would have raised the merit: terms of very different "
+        "weights or elements of very different sizes allow short ones only"
+    ]
 
 
 def _recent_fall(history: list[IterationRecord]) -> float:

@@ -165,7 +165,7 @@ def step(
     if best is not None:
         with watch.part("linearise"):
             linearised, standings = _linearise(problem, best, settings, state.linearised.stiffness)
-    outcomes = map(Outcome, dampings, trials.gains, *trials.sizes(), trials.taken)
+    outcomes = map(Outcome, dampings, trials.gains, *trials.sizes(), trials.taken, trials.halvings)
     courses = [
         _after(course, outcome, standing, settings, inexact=problem.solver.inexact, lost=number in proposal.lost)
         for number, (course, outcome, standing) in enumerate(zip(state.courses, outcomes, standings, strict=True))

@@ -39,6 +39,7 @@ class Trials:
             minus infinity while there is none.
         merits: Its merit.
         taken: Whether there is any.
+        halvings: How often it had to be halved as a whole.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class Trials:
         self.merits = [course.merit for course in state.courses]
         self.gains = [-math.inf for _ in state.courses]
         self.taken = [False for _ in state.courses]
+        self.halvings = [0 for _ in state.courses]
 
     def offer(self, change: Tensor, to: Sequence[bool] | None = None, *, again: bool = False) -> Evaluation | None:
         """Tries a step (N,); members for which it is the best so far take it.
@@ -107,6 +109,7 @@ class Trials:
         """The members that take what was tried, and their places in it."""
         for number, row in zip(takes, rows, strict=True):
             self.merits[number], self.taken[number] = tried.merits[row], True
+            self.halvings[number] = tried.halvings
         if len(takes) == len(self.merits):
             self._best, self._change = tried.trial, tried.change
         elif takes:
@@ -141,6 +144,7 @@ class Trials:
         that they do not stop all others.
         """
         structure, system, promised = self._problem.structure, self._proposal.system, self._promised
+        whole = change
         every = range(len(self.merits))
         if len(seen) < len(every):
             trial = self._evaluate(change, seen)
@@ -151,17 +155,33 @@ class Trials:
             trial = self._evaluate(change)
             merits = trial.merits.tolist()
             if all(map(math.isfinite, merits)):
-                return _Tried(trial, change, every, merits, promised)
+                tried = _Tried(trial, change, every, merits, promised)
+                return tried if any(fall > 0.0 for fall in promised) else self._shorter(whole) or tried
             change = torch.where(structure.unknowns_of_infinite_elements(trial), 0.5 * change, change)
             promised = system.predicted_fall(change).tolist()
         lost = [not math.isfinite(merit) for merit in merits]
         if all(lost):
-            return None
+            return self._shorter(whole)
         # Those that are nowhere finite stay where they are; they must not stop the other members.
         stay = torch.tensor(lost, device=change.device)
         change = torch.where(self._problem.layout.member_spread(stay), 0.0, change)
         trial, promised = self._evaluate(change), system.predicted_fall(change).tolist()
         return _Tried(trial, change, every, trial.merits.tolist(), promised)
+
+    def _shorter(self, change: Tensor) -> _Tried | None:
+        """What a step leads to that is shortened as a whole until all members are finite; None if none is.
+
+        Where elements are of very different sizes, a step in which some parts are held back is not downhill any more.
+        Shortened evenly it always is, and that costs no solve.
+        """
+        for number in range(1, _HALVINGS + 1):
+            change = 0.5 * change
+            trial = self._evaluate(change)
+            merits = trial.merits.tolist()
+            if all(map(math.isfinite, merits)):
+                promised = self._proposal.system.predicted_fall(change).tolist()
+                return _Tried(trial, change, range(len(merits)), merits, promised, number)
+        return None
 
     def _admits(self, trial: State) -> bool:
         return self._guard is None or self._guard(self._state.evaluation.state, trial)
@@ -175,10 +195,11 @@ class Trials:
 
 
 class _Tried(NamedTuple):
-    """A state tried, the step to it, and of members: numbers in the state, merits there, and falls promised to all."""
+    """A state tried, the step to it, numbers, merits and promised falls of members, and halvings of the whole step."""
 
     trial: Evaluation
     change: Tensor
     seen: Sequence[int]
     merits: list[float]
     promised: list[float]
+    halvings: int = 0

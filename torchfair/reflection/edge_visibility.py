@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from .._one_mesh import one_mesh
+from .._precision import in_single_at_least
 from ..cameras.camera import Camera, Size, check_camera, height_and_width
 from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals
@@ -19,6 +20,7 @@ _SLACK = (1.5, 1e-3)
 """What is not counted as in front: pixels along the slope of the nearest triangle, and a part of the depth range."""
 
 
+@in_single_at_least
 def edge_visibility(
     vertices: Tensor, topology: Topology, camera: Camera, *, size: Size = 1024, samples: int = 8
 ) -> Tensor:

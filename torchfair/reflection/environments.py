@@ -9,12 +9,14 @@ from typing import TypeAlias
 import torch
 from torch import Tensor, nn
 
+from .._loading import safe_to_load
 from ..errors import ShapeError, TorchfairError
 
 Environment: TypeAlias = Callable[[Tensor], Tensor]
 """Takes unit directions (..., 3), returns values (..., channels): any differentiable function will do."""
 
 
+@safe_to_load
 class Stripes(nn.Module):
     r"""Soft parallel stripes, ``1/2 + 1/2 tanh(sharpness sin(2 pi f w.r))`` for a mirror direction ``r``.
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
 
 import torch
 from torch import Tensor
 
+from .._loading import safe_to_load
+from .._precision import in_single_at_least
 from ..cameras import Camera, Size
-from ..energies.base import MeshModule
+from ..cameras.camera import height_and_width
+from ..energies.base import MeshModule, Reduction
 from ..errors import TorchfairError
 from ..geometry import face_areas
 from ..topology import Topology
@@ -17,7 +22,11 @@ from .setup import ReflectionSetup
 from .smooth_reference import Reference
 from .variation import reflection_variation
 
+_FINE = 400
+"""Samples along a picture, from which on the soft borders of stripes are wider than a sample."""
 
+
+@safe_to_load
 class ReflectionLoss(MeshModule):
     """``1 - SSIM`` of reflections, differentiable, plus a share of the reflection variation.
 
@@ -32,8 +41,9 @@ class ReflectionLoss(MeshModule):
     functions of the vertices, and this part helps them along; alone it makes slivers and creases. Neither cares for the
     shape of triangles.
 
-    Batches are leading dimensions of the vertices; ``torch.func.vmap`` does not apply, because what is seen where
-    depends on the values.
+    Batches are leading dimensions of the vertices. What is seen where depends on the values: ``torch.func.vmap``,
+    export and other recordings are refused. Copies and pickles hold the reference, not its pictures, which are rendered
+    again at their first call.
 
     Args:
         topology: connectivity of all meshes that the module is called with.
@@ -45,6 +55,7 @@ class ReflectionLoss(MeshModule):
         stripe_directions: likewise.
         frequency: likewise.
         size: pixels of the pictures, also in place of those of a setup.
+        reduction: see :class:`~torchfair.energies.MeshModule`.
 
     Raises:
         ShapeError: if a tensor has the wrong shape.
@@ -65,36 +76,61 @@ class ReflectionLoss(MeshModule):
         stripe_directions: Tensor | None = None,
         frequency: float | None = None,
         size: Size = 128,
+        reduction: Reduction = "none",
     ) -> None:
-        super().__init__(topology)
+        super().__init__(topology, reduction=reduction)
         if not variation_weight >= 0:
             raise TorchfairError(f"variation_weight must be at least 0, got {variation_weight}")
         if isinstance(reference, ReflectionSetup):
             setup = reference if reference.size == size else replace(reference, size=size)  # which renders anew
         else:
             setup = ReflectionSetup.for_reference(
-                reference, camera=camera, stripe_directions=stripe_directions, frequency=frequency, size=size
+                reference,
+                camera=camera,
+                stripe_directions=stripe_directions,
+                frequency=frequency,
+                size=size,
+                supersampling=_samples(size),
             )
         self.setup = setup
         self.variation_weight = variation_weight
-        images = coverage = area = None
+        area = None
         if setup.reference is not None:
-            images, _, coverage = setup.reference_pictures
-            area = face_areas(setup.reference.vertices, setup.reference.topology).sum()
-        for name, tensor in (("images", images), ("coverage", coverage), ("area", area)):
+            with torch.no_grad():
+                area = face_areas(setup.reference.vertices, setup.reference.topology).sum()
+        for name, tensor in (("images", None), ("coverage", None), ("area", area)):
             self.register_buffer(f"reference_{name}", tensor, persistent=False)
+        self._render_reference()
 
-    def forward(self, vertices: Tensor) -> Tensor:
+    def __getstate__(self) -> dict[str, Any]:
+        buffers = {**self._buffers, "reference_images": None, "reference_coverage": None}
+        return {**self.__dict__, "_buffers": buffers}
+
+    @property
+    def belongs_to_mesh(self) -> bool:
+        """True, since the reference is that of one mesh."""
+        return True
+
+    @torch.inference_mode(False)
+    def _render_reference(self) -> None:
+        if self.setup.reference is not None and self.reference_images is None and self.reference_area is not None:
+            images, _, coverage = self.setup.reference_pictures
+            like = self.reference_area
+            self.reference_images, self.reference_coverage = images.to(like), coverage.to(like)
+
+    def per_mesh(self, vertices: Tensor) -> Tensor:
         """Loss (*batch,) of ``vertices`` (*batch, V, 3)."""
         loss = self.dissimilarity(vertices)
         if self.variation_weight > 0:
             loss = loss + self.variation_weight * self.variation(vertices)
         return loss
 
+    @in_single_at_least
     def dissimilarity(self, vertices: Tensor) -> Tensor:
         """Mean ``1 - SSIM`` (*batch,) over views and stripe directions, 0 where nothing can be compared."""
         rendering = replace(self.setup, supersampling=1)
         flat = rendering.flat(vertices, self.topology, antialias=True)
+        self._render_reference()
         if self.reference_images is None or self.reference_coverage is None:
             images, _, coverage = rendering.smooth(vertices, self.topology)
         else:
@@ -103,6 +139,7 @@ class ReflectionLoss(MeshModule):
         per_view = dissimilarity(flat.stripes, images, window).mean(-1)
         return per_view.sum(-1) / window.any(-1).any(-1).sum(-1).clamp(min=1)
 
+    @in_single_at_least
     def variation(self, vertices: Tensor) -> Tensor:
         """Mean dual reflection variation (*batch,) divided by the square root of the area."""
         area = face_areas(vertices, self.topology).sum(-1) if self.reference_area is None else self.reference_area
@@ -112,4 +149,9 @@ class ReflectionLoss(MeshModule):
     def extra_repr(self) -> str:
         """The topology and the choices in words."""
         views, size = self.setup.camera.num_views, self.setup.size
-        return f"{self.topology!r}, {views} views, size={size}, variation_weight={self.variation_weight:g}"
+        return f"{super().extra_repr()}, {views} views, size={size}, variation_weight={self.variation_weight:g}"
+
+
+def _samples(size: Size) -> int:
+    """Samples along a pixel of the reference: at most 3, and no more than make the picture fine."""
+    return max(1, min(3, math.ceil(_FINE / max(height_and_width(size)))))

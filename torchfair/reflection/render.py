@@ -10,6 +10,8 @@ import torch
 from torch import Tensor
 from torch.autograd.forward_ad import unpack_dual
 
+from .._precision import in_single_at_least
+from .._tracing import refuse_recording
 from ..cameras.camera import Camera, Size, check_camera, height_and_width
 from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals, vertex_normals
@@ -92,15 +94,18 @@ def render_reflection(
 
     Raises:
         ShapeError: if a tensor has the wrong shape, or the size is below one pixel.
-        TorchfairError: if a vertex is not finite, or for an unknown shading or a supersampling below 1.
+        TorchfairError: if a vertex is not finite, or for an unknown shading or a supersampling below 1; under
+            ``vmap``, and where calls are recorded (export, ``make_fx``, ``jit.trace``, ``linearize``).
         TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
     """
+    refuse_recording("render_reflection")
     draw = _checked
     if torch.compiler.is_compiling():  # left to eager mode: sizes depend on what is seen
         draw = torch.compiler.disable(_checked)  # type: ignore[no-untyped-call]
     return draw(vertices, topology, camera, environment, size, supersampling, antialias, shading, normals, background)
 
 
+@in_single_at_least
 def _checked(
     vertices: Tensor,
     topology: Topology,

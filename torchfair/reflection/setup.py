@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
-from ..cameras.camera import Camera, Size, check_camera
+from .._loading import safe_to_load
+from .._tables import cached_table
+from ..cameras.camera import Camera, Size, check_camera, height_and_width
 from ..errors import TorchfairError
 from ..topology import Topology
 from .default_views import default_camera, default_stripe_directions
@@ -22,6 +23,7 @@ STRIPES = 4.0
 """Stripe pairs over the mirrored directions of the reference, if no frequency is given."""
 _FEWEST_RADIANS = 0.05
 _PROBE = 96
+_FEWEST_CELLS, _MOST_CELLS = 64, 160
 
 
 class Pictures(NamedTuple):
@@ -38,6 +40,7 @@ class Pictures(NamedTuple):
     coverage: Tensor
 
 
+@safe_to_load
 @dataclass(frozen=True, eq=False)
 class ReflectionSetup:
     """The same views and stripes for any number of meshes, and what they are compared with.
@@ -66,6 +69,7 @@ class ReflectionSetup:
         check_camera(self.camera)
 
     @classmethod
+    @torch.inference_mode(False)
     def for_reference(
         cls,
         reference: Reference,
@@ -79,7 +83,8 @@ class ReflectionSetup:
         """A setup that suits a smooth reference.
 
         Args:
-            reference: a mesh ``(vertices, topology)``, an analytic surface or a :class:`SmoothReference`.
+            reference: a mesh ``(vertices, topology)``, an analytic surface (sampled as finely as the pictures, by 64 to
+                160 quads each way) or a :class:`SmoothReference`.
             camera: the views, by default those of :func:`default_camera`.
             stripe_directions: (k, 3), by default those of :func:`default_stripe_directions`.
             frequency: stripe pairs per unit of ``w.r``; by default such that the directions mirrored by the
@@ -92,7 +97,9 @@ class ReflectionSetup:
             TorchfairError: if a vertex is not finite, or a frequency not positive.
             TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
         """
-        surface = smooth_reference(reference)
+        # No more cells than pixels: their triangles would be what takes most of the time.
+        cells = min(_MOST_CELLS, max(_FEWEST_CELLS, *height_and_width(size)))
+        surface = smooth_reference(reference, cells)
         camera = default_camera(surface) if camera is None else camera
         waves = default_stripe_directions(surface) if stripe_directions is None else stripe_directions
         if frequency is None:
@@ -123,7 +130,11 @@ class ReflectionSetup:
         )
         return _split(picture.image, picture.coverage)
 
-    @cached_property
+    def __getstate__(self) -> dict[str, Any]:
+        """What copies and pickles hold: no pictures, which are rendered again when they are asked for."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @cached_table
     def reference_pictures(self) -> Pictures:
         """Pictures of the reference, rendered at the first call and kept.
 

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import torch
 from torch import Tensor
 
+from .._loading import safe_to_load
 from .._one_mesh import one_mesh
 from ..errors import TorchfairError
 from ..geometry import vertex_normals
@@ -18,6 +19,7 @@ from ..topology import Topology
 _CELLS = 160
 
 
+@safe_to_load
 @dataclass(frozen=True, eq=False)
 class SmoothReference:
     """A mesh that mirrors with normals blended across its faces, as if it were smooth.
@@ -63,8 +65,8 @@ Reference: TypeAlias = SmoothReference | Surface | tuple[Tensor, Topology]
 """What a mesh can be compared with."""
 
 
-def smooth_reference(reference: Reference) -> SmoothReference:
-    """The reference itself, a surface sampled, or a mesh ``(vertices, topology)`` with its vertex normals.
+def smooth_reference(reference: Reference, cells: int = _CELLS) -> SmoothReference:
+    """The reference itself, a surface sampled by ``cells x cells`` quads, or a mesh with its vertex normals.
 
     Raises:
         ShapeError: if the vertices of a mesh are not one mesh that fits its topology.
@@ -73,7 +75,7 @@ def smooth_reference(reference: Reference) -> SmoothReference:
     if isinstance(reference, SmoothReference):
         return reference
     if isinstance(reference, Surface):
-        return SmoothReference.of_surface(reference)
+        return SmoothReference.of_surface(reference, cells)
     if isinstance(reference, tuple) and len(reference) == 2 and isinstance(reference[1], Topology):
         return SmoothReference.of_mesh(*reference)
     raise TorchfairError(

@@ -7,10 +7,13 @@ from typing import Literal, get_args
 import torch
 from torch import Tensor
 
-from ..energies.base import MeshModule
+from .._loading import safe_to_load
+from .._precision import in_single_at_least
+from ..energies.base import MeshModule, Reduction, in_words, register
 from ..errors import ShapeError, TorchfairError
 from ..geometry import dual_edge_lengths
 from ..geometry._ops import cross, norm
+from ..geometry._unit import in_its_unit
 from ..geometry.lengths import edge_vectors
 from ..geometry.normals import adjacent_normals, normalise
 from ..topology import Topology
@@ -19,6 +22,7 @@ from .view_directions import axis_directions
 Form = Literal["sine", "dual"]
 
 
+@in_single_at_least
 def reflection_variation_per_edge(
     vertices: Tensor,
     topology: Topology,
@@ -32,6 +36,8 @@ def reflection_variation_per_edge(
     Arguments, degenerate cases and errors as for :func:`reflection_variation`.
     """
     _check_form(form)
+    topology.check_vertices(vertices)
+    vertices, unit = in_its_unit(vertices)
     edges = edge_vectors(vertices, topology)[..., : topology.num_interior_edges, :]
     if directions is None:
         directions = axis_directions(torch.eye(3, dtype=vertices.dtype, device=vertices.device))
@@ -46,7 +52,7 @@ def reflection_variation_per_edge(
         # What is divided by a length of zero is zero, with derivative zero.
         densities = 2 * dual_edge_lengths(vertices, topology) / torch.where(lengths > 0, lengths, 1.0)
         terms = across * densities[..., None, :]
-    return see(terms, visibility, topology)
+    return see(terms * unit[..., None], visibility, topology)
 
 
 def reflection_variation(
@@ -102,6 +108,7 @@ def reflection_variation(
     ).sum(-1)  # fmt: skip
 
 
+@safe_to_load
 class ReflectionVariation(MeshModule):
     """Mean reflection variation over some views: ``forward(vertices)`` (*batch, V, 3) -> (*batch,).
 
@@ -112,6 +119,7 @@ class ReflectionVariation(MeshModule):
         directions: (n, 3) lines of sight, by default :func:`axis_directions`. A buffer.
         form: ``"dual"`` (for minimising) or ``"sine"`` (for measuring).
         visibility: (n, I) visible share of every interior edge in each view, 1 if left out. A buffer.
+        reduction: see :class:`~torchfair.energies.MeshModule`.
 
     Raises:
         ShapeError: if a tensor has the wrong shape or is not floating.
@@ -128,15 +136,21 @@ class ReflectionVariation(MeshModule):
         *,
         form: Form = "dual",
         visibility: Tensor | None = None,
+        reduction: Reduction = "none",
     ) -> None:
-        super().__init__(topology)
+        super().__init__(topology, reduction=reduction)
         _check_form(form)
         directions = axis_directions() if directions is None else directions
         _check_rows("directions", directions)
         _check_visibility(visibility, topology)
         self.form: Form = form
-        self.register_buffer("directions", directions)
-        self.register_buffer("visibility", visibility)
+        register(self, "directions", directions)
+        register(self, "visibility", visibility)
+
+    @property
+    def belongs_to_mesh(self) -> bool:
+        """Whether there are visible shares of edges."""
+        return self.visibility is not None
 
     def per_edge(self, vertices: Tensor) -> Tensor:
         """Terms (*batch, I), means over the views; they sum to ``forward(vertices)``."""
@@ -145,13 +159,14 @@ class ReflectionVariation(MeshModule):
         )
         return terms.mean(-2)
 
-    def forward(self, vertices: Tensor) -> Tensor:
+    def per_mesh(self, vertices: Tensor) -> Tensor:
         """Mean variation (*batch,) of ``vertices`` (*batch, V, 3)."""
         return self.per_edge(vertices).sum(-1)
 
     def extra_repr(self) -> str:
         """The topology and the choices in words."""
-        return f"{self.topology!r}, {self.directions.shape[-2]} views, form={self.form!r}"
+        words = f"{super().extra_repr()}, {self.directions.shape[-2]} views, form={self.form!r}"
+        return words + in_words("visibility", self.visibility)
 
 
 # ---- shared with the variation seen from a point ---------------------------------------------------------

@@ -8,6 +8,7 @@ import math
 import torch
 from torch import Tensor
 
+from .._precision import in_single_at_least
 from ..geometry._ops import cross, dot, face_groups, gather, norm
 from ..geometry.lengths import edge_vectors
 from ..geometry.normals import adjacent_normals
@@ -15,6 +16,7 @@ from ..topology import Topology
 from .variation import see, view_vectors
 
 
+@in_single_at_least
 def reflection_variation_from_eyes_per_edge(
     vertices: Tensor, topology: Topology, eyes: Tensor, *, visibility: Tensor | None = None
 ) -> Tensor:
@@ -70,6 +72,7 @@ def reflection_variation_from_eyes(
     return reflection_variation_from_eyes_per_edge(vertices, topology, eyes, visibility=visibility).sum(-1)
 
 
+@in_single_at_least
 def solid_angles(vertices: Tensor, topology: Topology, eyes: Tensor) -> Tensor:
     """Signed solid angle of every face seen from each eye: (*batch, n, F).
 

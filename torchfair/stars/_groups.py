@@ -8,6 +8,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from .._loading import safe_to_load
 from ..geometry import corner_angles, face_normals
 from ..geometry._ops import cross, dot
 from ..topology import Topology
@@ -15,6 +16,7 @@ from ..topology import Topology
 _STRAIGHT = math.pi - 1e-5  # a corner from here on is cut in two: its arms alone hardly tell its plane
 
 
+@safe_to_load
 class StarGroup(NamedTuple):
     """Inner vertices with equally many edges.
 
@@ -29,6 +31,7 @@ class StarGroup(NamedTuple):
     corners: Tensor
 
 
+@torch.inference_mode(False)
 def star_groups(topology: Topology) -> list[StarGroup]:
     """All inner vertices, grouped by valence. Boundary vertices and isolated ones are in no group."""
     size = max(topology.num_vertices, 1)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._loading import safe_to_load
+from .._precision import in_single_at_least
 from ..energies.base import MeshModule
 from ..geometry import face_normals
 from ..geometry._ops import cross, gather, norm
@@ -58,6 +60,7 @@ def pyramid_penalty(vertices: Tensor, topology: Topology) -> Tensor:
     return pyramid_penalty_per_vertex(vertices, topology).sum(-1)
 
 
+@safe_to_load
 class PyramidPenalty(MeshModule):
     """Module form of :func:`pyramid_penalty`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
 
@@ -72,11 +75,12 @@ class PyramidPenalty(MeshModule):
         self.topology.check_vertices(vertices)
         return _per_vertex(vertices, self.topology, self.groups)
 
-    def forward(self, vertices: Tensor) -> Tensor:
+    def per_mesh(self, vertices: Tensor) -> Tensor:
         """Penalty (*batch,) of ``vertices`` (*batch, V, 3)."""
         return self.per_vertex(vertices).sum(-1)
 
 
+@in_single_at_least
 def _per_vertex(vertices: Tensor, topology: Topology, groups: list[StarGroup]) -> Tensor:
     normals = face_normals(vertices, topology)
     total = vertices.sum(-1) * 0.0  # NaN stays NaN

@@ -7,14 +7,18 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from ..energies.base import MeshModule
+from .._loading import safe_to_load
+from .._precision import in_single_at_least
+from ..energies.base import MeshModule, Reduction
 from ..errors import MeshError, ShapeError
 from ..geometry._ops import dot, gather
+from ..geometry._unit import in_its_unit
 from ..topology import Topology
 from ._groups import star_groups
 from ._saddle_targets import LEAST_EDGES, MOST_TARGET_EDGES, good_patterns, saddle_planes, saddle_sides, star_shape
 
 
+@safe_to_load
 class SaddleGroup(NamedTuple):
     """Stars with equally many edges that should be good saddles.
 
@@ -75,19 +79,21 @@ def saddle_penalty(vertices: Tensor, topology: Topology, saddles: Tensor | None 
     return saddle_penalty_per_vertex(vertices, topology, saddles).sum(-1)
 
 
+@safe_to_load
 class SaddlePenalty(MeshModule):
     """Module form of :func:`saddle_penalty`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,).
 
     Args:
         topology: connectivity of all meshes that the module is called with.
         saddles: (V,) bool, see :func:`saddle_penalty`.
+        reduction: see :class:`~torchfair.energies.MeshModule`.
     """
 
     groups: list[SaddleGroup]
 
-    def __init__(self, topology: Topology, saddles: Tensor | None = None) -> None:
+    def __init__(self, topology: Topology, saddles: Tensor | None = None, *, reduction: Reduction = "none") -> None:
         self.saddles = saddles
-        super().__init__(topology)
+        super().__init__(topology, reduction=reduction)
 
     def _set_topology(self, topology: Topology) -> None:
         super()._set_topology(topology)
@@ -99,11 +105,12 @@ class SaddlePenalty(MeshModule):
         """Terms (*batch, V); see :func:`saddle_penalty_per_vertex`."""
         return _per_vertex(vertices, self.topology, self.groups)
 
-    def forward(self, vertices: Tensor) -> Tensor:
+    def per_mesh(self, vertices: Tensor) -> Tensor:
         """Penalty (*batch,) of ``vertices`` (*batch, V, 3)."""
         return self.per_vertex(vertices).sum(-1)
 
 
+@torch.inference_mode(False)
 def saddle_groups(topology: Topology, saddles: Tensor | None) -> list[SaddleGroup]:
     """Groups of the chosen stars; see :func:`saddle_penalty`."""
     possible = ~topology.is_boundary_vertex & (topology.valences >= LEAST_EDGES)
@@ -128,8 +135,10 @@ def saddle_groups(topology: Topology, saddles: Tensor | None) -> list[SaddleGrou
     return groups
 
 
+@in_single_at_least
 def _per_vertex(vertices: Tensor, topology: Topology, groups: list[SaddleGroup]) -> Tensor:
     topology.check_vertices(vertices)
+    vertices, _ = in_its_unit(vertices)
     total = vertices.sum(-1) * 0.0  # NaN stays NaN
     for centres, ring, patterns in groups:
         arms = gather(vertices, ring) - gather(vertices, centres)[..., None, :]

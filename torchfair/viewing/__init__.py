@@ -6,12 +6,14 @@ Importing this package imports neither matplotlib nor PIL; they are loaded when 
 from ..rasterisation.rasterise import Fragments as Fragments
 from ..rasterisation.rasterise import rasterise as rasterise
 from .camera import fit_camera as fit_camera
+from .chosen_view import chosen_view as chosen_view
 from .lines import EdgeStyle as EdgeStyle
 from .picture_before_after import picture_before_after as picture_before_after
 from .picture_curvature import picture_curvature as picture_curvature
 from .picture_edges import picture_edges as picture_edges
 from .picture_gauss_image import picture_gauss_image as picture_gauss_image
 from .picture_gauss_images import picture_gauss_images as picture_gauss_images
+from .picture_labels import picture_labels as picture_labels
 from .picture_mesh import picture_mesh as picture_mesh
 from .picture_principal_edges import picture_principal_edges as picture_principal_edges
 from .picture_principal_mesh import picture_principal_mesh as picture_principal_mesh

@@ -13,11 +13,16 @@ def energy_caption(
 ) -> str:
     """``name``, E and E' of one mesh ``(V, 3)``; with a ``reference`` mesh also how E has changed, in percent."""
     energy = float(normal_variation(vertices, topology))
-    caption = f"{literal(name)}     $E$ = {energy:#.4g}"
+    caption = f"{literal(name)}     $E$ = {four_digits(energy)}"
     base = float(normal_variation(*reference)) if reference is not None else 0.0
     if base > 0:
         caption += f"  ({signed_percent(energy / base - 1)})"
-    return caption + f"     $E'$ = {float(angle_variation(vertices, topology)):#.4g}"
+    return caption + f"     $E'$ = {four_digits(float(angle_variation(vertices, topology)))}"
+
+
+def four_digits(value: float) -> str:
+    """Four significant digits, zeros at the end included: ``1.200``, ``1285``, without a point behind the last."""
+    return f"{value:#.4g}".rstrip(".")
 
 
 def literal(words: str) -> str:

@@ -24,12 +24,15 @@ class EdgeStyle:
         order: ``(E,)`` numbers; where lines overlap, the edge with the larger one is on top (ties: the larger edge
             number). By default the edge number.
         opacity: 1 hides the surface under a line, 0 leaves no line.
+        rim: width in pixels of a line where the mesh ends before the background, 0 for none; in the first colour. It
+            follows what is seen, and so has no gaps where a surface of warped faces turns away inside of them.
     """
 
     colors: Tensor
     widths: Tensor | float = 0.7
     order: Tensor | None = None
     opacity: float = 1.0
+    rim: float = 0.0
 
 
 class Surface(NamedTuple):

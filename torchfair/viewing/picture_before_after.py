@@ -12,12 +12,15 @@ from ..reflection import Stripes, face_mirror_directions
 from ..topology import Topology
 from .camera import fit_camera
 from .captions import energy_caption
+from .close_up import Part, Place, part_around, worst_place
 from .common_topology import topologies_of
 from .render import MeshView
 from .shading import shade_faces, stripe_colors, stripe_frequency
 from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction
 from .wireframe import outline, quiet_edges
+
+_CLOSE = 0.6  # rows of a close-up, over its columns
 
 
 def picture_before_after(
@@ -32,6 +35,8 @@ def picture_before_after(
     overwrite: bool = False,
 ) -> tuple[int, int]:
     """Writes a PNG with the mesh before (left) and after (right): flat shaded above, mirroring stripes below.
+
+    Of larger meshes a third row shows what surrounds the edge that had the largest ``l |a|`` before, in both.
 
     All four views share one camera, and both reflections the same striped surroundings: a smooth surface shows
     smooth stripes. The captions give E (normal variation) and E' (angle variation).
@@ -64,7 +69,10 @@ def picture_before_after(
     stripes = Stripes(across, stripe_frequency(mirrored[0] @ across.to(before), topologies[0]))
 
     row = CAPTION + size[0]
-    sheet = Sheet(width, 2 * row + MARGIN, title)
+    place = worst_place(*meshes[0])
+    parts = _parts(meshes, place)
+    close = round(panel * _CLOSE) if parts else 0
+    sheet = Sheet(width, 2 * row + (CAPTION + close if parts else 0) + MARGIN, title)
     sheet.note("daylight", MARGIN, sheet.top)
     sheet.note("mirror", MARGIN, sheet.top + row)
     captions = energy_caption("before", *meshes[0]), energy_caption("after", *meshes[1], meshes[0])
@@ -76,4 +84,31 @@ def picture_before_after(
         sheet.image(daylight, left, sheet.top + CAPTION)
         colors = stripe_colors(stripes(mirrored[column])[:, 0])
         sheet.image(mesh.paint(colors, edges=outline(mesh)), left, sheet.top + row + CAPTION)
+    if place is not None and parts:
+        sheet.note("close-up of the worst place before", MARGIN, sheet.top + 2 * row)
+        views = _close_views(parts, place, towards_eye, (close, panel))
+        for column, view_of_part in enumerate(views):
+            sheet.image(view_of_part, MARGIN + column * (panel + GAP), sheet.top + 2 * row + CAPTION)
     return sheet.write(path, overwrite=overwrite)
+
+
+def _parts(meshes: Sequence[tuple[Tensor, Topology]], place: Place | None) -> list[Part]:
+    """What surrounds a place, in all meshes; nothing where it is as large as a mesh."""
+    if place is None:
+        return []
+    found = [part_around(vertices, topology, place) for vertices, topology in meshes]
+    return [] if None in found else [part for part in found if part is not None]
+
+
+def _close_views(parts: Sequence[Part], place: Place, up: Tensor, size: tuple[int, int]) -> list[Tensor]:
+    """Parts as mirrors, seen along the normal of the place, from one eye and among the same stripes."""
+    used = [part.vertices[part.topology.corners] for part in parts]
+    camera, size = fit_camera(*used, towards_eye=place.normal.cpu(), up=up, width=size[1], height=size[0])
+    across = camera.axes[0, 0]
+    rays = [face_mirror_directions(part.vertices, part.topology, camera)[0] for part in parts]
+    stripes = Stripes(across, stripe_frequency(rays[0] @ across.to(rays[0]), parts[0].topology))
+    pictures = []
+    for part, mirrored in zip(parts, rays, strict=True):
+        mesh = MeshView(part.vertices, part.topology, camera, size)
+        pictures.append(mesh.paint(stripe_colors(stripes(mirrored)[:, 0]), edges=quiet_edges(mesh)))
+    return pictures

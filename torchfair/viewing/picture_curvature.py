@@ -14,7 +14,7 @@ from ..errors import ShapeError
 from ..geometry import vertex_areas
 from ..topology import Topology
 from .camera import fit_camera
-from .captions import literal
+from .captions import four_digits, literal
 from .color_scale import BAR, ColorScale
 from .render import MeshView
 from .shading import shade_faces
@@ -36,7 +36,7 @@ def picture_curvature(
 
     White is flat. Camera and colour scale are common to all; the scale ends as in :func:`picture_edges`. The
     curvature of a vertex is that of its star over its area, boundary vertices as their neighbours; captions
-    give C.
+    give C with the boundary extrapolated, as the colours show it; what jobs report as C has an open boundary.
 
     Args:
         path: the PNG file.
@@ -73,7 +73,8 @@ def picture_curvature(
     for column, (name, *_) in enumerate(meshes):
         left, top = MARGIN + column * (panel + GAP), sheet.top
         mesh = MeshView(vertices[column], topologies[column], camera, size)
-        sheet.caption(f"{literal(name)}     $C$ = {float(stars[column].sum()):#.4g}", left, top, panel)
+        total = float(stars[column].sum())
+        sheet.caption(f"{literal(name)}     $C$ (boundary extrapolated) = {four_digits(total)}", left, top, panel)
         daylight, colors = _panels(mesh, scale.colors(values[column]))
         sheet.image(daylight, left, top + CAPTION)
         sheet.image(colors, left, top + row)

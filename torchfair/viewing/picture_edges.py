@@ -11,6 +11,7 @@ from torch import Tensor
 from .._one_mesh import one_mesh
 from ..energies import angle_variation_per_edge
 from ..errors import ShapeError
+from ..geometry import edge_lengths
 from ..topology import Topology
 from .camera import fit_camera
 from .captions import energy_caption
@@ -23,6 +24,7 @@ from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction
 from .wireframe import line_width
 
+_ALIKE = 1.25  # quotient of mean edges up to which meshes are equally fine
 _LIGHTEST = 0.04  # start of the colour map: what is lighter cannot be told from the faces
 
 
@@ -41,6 +43,8 @@ def picture_edges(
 
     Camera and colour scale are common to all; the scale ends at the largest value, or at the 98 % quantile where
     the largest is more than 1.5 times that (the colour bar then ends in an arrow). Boundary edges are thin and grey.
+    Of meshes with very different mean edges, values are divided by the square of these: ``l |a|`` of one surface is
+    four times as large on edges twice as long.
 
     Args:
         path: the PNG file.
@@ -64,7 +68,8 @@ def picture_edges(
     topologies = topologies_of(len(meshes), topology)
     vertices = [one_mesh(v, t) for v, t in zip(meshes.values(), topologies, strict=True)]
     values = [angle_variation_per_edge(v, t) for v, t in zip(vertices, topologies, strict=True)]
-    scale = ColorScale.of(torch.cat(values), r"$\ell\,|\alpha|$", color_map="magma_r", lightest=_LIGHTEST)
+    label, values = _comparable(values, vertices, topologies)
+    scale = ColorScale.of(torch.cat(values), label, color_map="magma_r", lightest=_LIGHTEST)
     columns = min(columns, len(meshes))
     panel = (width - 2 * MARGIN - BAR - (columns - 1) * GAP) // columns
     towards_eye, up = view or view_direction(vertices[0], topologies[0])
@@ -81,6 +86,18 @@ def picture_edges(
         sheet.image(_panel(shown, values[number], scale), left, top + CAPTION)
     scale.draw_bar(sheet, rows * row)
     return sheet.write(path, overwrite=overwrite)
+
+
+def _comparable(
+    values: Sequence[Tensor], vertices: Sequence[Tensor], topologies: Sequence[Topology]
+) -> tuple[str, list[Tensor]]:
+    """Label and values of the scale: l |a|, over the squared mean edge where meshes are not equally fine."""
+    means = [
+        float(edge_lengths(v, t).mean()) if t.num_edges else 0.0 for v, t in zip(vertices, topologies, strict=True)
+    ]
+    if not min(means) > 0.0 or max(means) <= _ALIKE * min(means):
+        return r"$\ell\,|\alpha|$", list(values)
+    return r"$\ell\,|\alpha| / \bar\ell^2$", [value / mean**2 for value, mean in zip(values, means, strict=True)]
 
 
 def _panel(mesh: MeshView, values: Tensor, scale: ColorScale) -> Tensor:

@@ -11,6 +11,7 @@ from torch import Tensor
 from .._one_mesh import one_mesh
 from ..geometry import GaussImage, face_area_vectors, gauss_image
 from ..topology import Topology
+from .captions import four_digits
 from .common_topology import topologies_of
 from .sheet import CAPTION, GAP, MARGIN, Sheet, points
 from .sphere import draw_arcs, draw_points, draw_sphere, fit_sphere_view
@@ -60,7 +61,7 @@ def picture_gauss_images(
     for column, (name, image) in enumerate(zip(("before", "after"), images, strict=True)):
         left = MARGIN + column * (panel + GAP)
         strength = min(1.0, (1500 / max(1, len(image.arcs))) ** 0.5)
-        total = f"{_perimeter(image):#.4g}"
+        total = four_digits(_perimeter(image))
         sheet.caption(f"{name}     arcs in total {total} rad", left, sheet.top, panel)
         axes = sheet.axes(left, sheet.top + CAPTION, panel, panel)
         draw_sphere(axes, view)

@@ -12,6 +12,7 @@ from ..geometry import planarity
 from ..topology import Topology
 from .camera import fit_camera
 from .color_scale import BAR, ColorScale
+from .legend import Entry, draw_legends
 from .render import MeshView
 from .shading import FRONT, shade_faces
 from .sheet import CAPTION, GAP, MARGIN, Sheet
@@ -65,7 +66,10 @@ def picture_principal_mesh(
     towards_eye, up = view or view_direction(vertices, topology)
     camera, size = fit_camera(vertices, towards_eye=towards_eye, up=up, width=panel)
     mesh = MeshView(vertices, topology, camera, size)
-    sheet = Sheet(width, CAPTION + size[0] + MARGIN, title)
+    found = [(1, _FEWER, "fewer faces meet"), (-1, _MORE, "more faces meet")]
+    counts = [(int((torch.sign(singular_indices) == sign).sum()), color, words) for sign, color, words in found]
+    legend = [Entry(f"{words} than elsewhere: {n}", color) for n, color, words in counts if n]
+    sheet = Sheet(width, (2 if legend else 1) * CAPTION + size[0] + MARGIN, title)
     columns = (
         (f"{len(singular_points)} singular points", _marked(vertices, topology, singular_points, singular_indices)),
         (f"planarity: mean {float(deviation.mean()):.2g}, max {float(deviation.max()):.2g}", scale.colors(deviation)),
@@ -78,6 +82,8 @@ def picture_principal_mesh(
         )
         sheet.image(painted, left, sheet.top + CAPTION)
     scale.draw_bar(sheet, CAPTION + size[0])
+    if legend:
+        draw_legends(sheet, [legend], [MARGIN], sheet.top + CAPTION + size[0], panel)
     return sheet.write(path, overwrite=overwrite)
 
 

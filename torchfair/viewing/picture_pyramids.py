@@ -13,7 +13,7 @@ from .._one_mesh import one_mesh
 from ..errors import ShapeError
 from ..stars import StarClasses, StarKind, normal_pyramid
 from .sheet import CAPTION, GAP, MARGIN, Sheet, points
-from .sphere import draw_arcs, draw_points, draw_sphere, fit_sphere_view, on_sphere
+from .sphere import draw_arcs, draw_points, draw_rings, draw_sphere, fit_sphere_view, on_sphere
 
 
 def picture_pyramids(
@@ -32,7 +32,7 @@ def picture_pyramids(
     """Writes a PNG with the normal pyramids of chosen inner vertices (paper Figs. 2 and 4).
 
     Each is seen from outside along its mean normal, in a window of its own size: the finer the mesh, the smaller
-    the pyramids; the net of circles tells how small.
+    the pyramids; the net of circles tells how small. Rings mark where a pyramid crosses itself.
 
     Args:
         path: the PNG file.
@@ -74,8 +74,31 @@ def picture_pyramids(
         pattern = ",".join(map(str, classes.pattern(vertex, ordinary=True)))
         sheet.caption(f"vertex {names.vertex(vertex)}: {kind}", left, top, panel)
         words = f"edges {pattern}" + (f", {int(crossings[vertex])} crossings" if crossings[vertex] else "")
-        sheet.text(words, left + panel / 2, top + 1.35 * CAPTION, 21, "#5b6472", ha="center", va="center")
+        color = _CROSSING if crossings[vertex] else "#5b6472"
+        sheet.text(words, left + panel / 2, top + 1.35 * CAPTION, 21, color, ha="center", va="center")
     return sheet.write(path, overwrite=overwrite)
+
+
+_CROSSING = "#c2185b"
+
+
+def arc_crossings(normals: Tensor) -> Tensor:
+    """(n, 3) points of the sphere where sides of a closed polygon of unit vectors (k, 3) cross, neighbours left out."""
+    index = torch.arange(len(normals))
+    first, second = torch.triu_indices(len(normals), len(normals), offset=2)
+    beside = (first == 0) & (second == len(normals) - 1)
+    first, second = first[~beside], second[~beside]
+    a, b, c, d = (normals[i] for i in (first, index.roll(-1)[first], second, index.roll(-1)[second]))
+    one, other = torch.linalg.cross(a, b), torch.linalg.cross(c, d)
+    meets = torch.linalg.cross(one, other)
+    meets = torch.where(((meets * (a + b + c + d)).sum(-1) < 0)[:, None], -meets, meets)
+
+    def between(x: Tensor, y: Tensor, normal: Tensor) -> Tensor:
+        before, behind = torch.linalg.cross(x, meets), torch.linalg.cross(meets, y)
+        inside: Tensor = ((before * normal).sum(-1) > 0) & ((behind * normal).sum(-1) > 0)
+        return inside
+
+    return torch.nn.functional.normalize(meets[between(a, b, one) & between(c, d, other)], dim=-1, eps=1e-300)
 
 
 def _draw(sheet: Sheet, normals: Tensor, left: int, top: int, size: int) -> None:
@@ -88,4 +111,5 @@ def _draw(sheet: Sheet, normals: Tensor, left: int, top: int, size: int) -> None
     index = torch.arange(len(normals))
     draw_arcs(axes, view, normals, torch.stack([index, index.roll(-1)], dim=1), points(3.0))
     draw_points(axes, view, normals, points(9))
+    draw_rings(axes, view, arc_crossings(normals), points(22), _CROSSING)
     sheet.note(f"net: {view.net_step}\N{DEGREE SIGN}", left, top - 8)

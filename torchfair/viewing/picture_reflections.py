@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor
@@ -63,7 +64,7 @@ def picture_reflections(
 def picture_reflection_differences(
     path: str | os.PathLike[str], score: ReflectionScore, title: str = "", *, overwrite: bool = False
 ) -> tuple[int, int]:
-    """Writes a PNG with the differences of all views (columns) and stripe directions (rows).
+    """Writes a PNG with the differences of all views (columns) and stripe directions (rows), each below its score.
 
     Args:
         path: the PNG file.
@@ -80,10 +81,9 @@ def picture_reflection_differences(
     differences = _differences(score)
     rows = {}
     for number in range(differences.shape[1]):
-        values = "    ".join(f"{value:.3f}" for value in score.per_view[:, number].tolist())
-        rows[f"stripe direction {number + 1}: {values}"] = differences[:, number]
+        rows[f"stripe direction {number + 1}"] = differences[:, number]
     captions = [_words(f"view {view + 1}", value) for view, value in enumerate(score.per_view.mean(-1).tolist())]
-    return _write(path, title, rows, captions, overwrite)
+    return _write(path, title, rows, captions, overwrite, score.per_view.T.tolist())
 
 
 def _words(name: str, value: float) -> str:
@@ -101,20 +101,33 @@ def _differences(score: ReflectionScore) -> Tensor:
 
 
 def _write(
-    path: str | os.PathLike[str], title: str, rows: dict[str, Tensor], captions: list[str], overwrite: bool
+    path: str | os.PathLike[str],
+    title: str,
+    rows: dict[str, Tensor],
+    captions: list[str],
+    overwrite: bool,
+    scores: Sequence[Sequence[float]] = (),
 ) -> tuple[int, int]:
-    """Rows of pictures (views, H, W, 3) with a note above each row and captions below the last."""
+    """Rows of pictures (views, H, W, 3) with a note above each row, or above pictures their scores, and captions below.
+
+    With ``scores``, one for every picture of every row, the note stands in the line before.
+    """
     views, height, width, _ = next(iter(rows.values())).shape
-    line = height + CAPTION
+    above = CAPTION * (2 if scores else 1)
+    line, size = height + above, min(24, width / 9)
     sheet = Sheet(2 * MARGIN + views * width + (views - 1) * _GAP, len(rows) * line + CAPTION + MARGIN // 2, title)
     for number, (note, pictures) in enumerate(rows.items()):
         top = sheet.top + number * line
         sheet.note(note, MARGIN, top)
         for view, picture in enumerate(pictures):
-            sheet.image(picture, MARGIN + view * (width + _GAP), top + CAPTION)
+            left = MARGIN + view * (width + _GAP)
+            sheet.image(picture, left, top + above)
+            if scores:
+                middle = left + width / 2, top + 1.5 * CAPTION
+                sheet.text(f"{scores[number][view]:.3f}", *middle, size, ha="center", va="center")
     for view, caption in enumerate(captions):
         sheet.text(
             caption, MARGIN + view * (width + _GAP) + width / 2, sheet.top + len(rows) * line + CAPTION / 2,
-            min(24, width / 9), ha="center", va="center",
+            size, ha="center", va="center",
         )  # fmt: skip
     return sheet.write(path, overwrite=overwrite)

@@ -13,6 +13,7 @@ from ..geometry import face_centres
 from ..stars import StarClasses, StarKind
 from ..topology import Topology
 from .camera import fit_camera
+from .legend import Entry, draw_legends
 from .lines import EdgeStyle
 from .render import MeshView
 from .shading import shade_faces
@@ -77,12 +78,15 @@ def picture_star_classes(
         ("stars", codes, _COLORS),
         ("normal pyramids", torch.where(boundary, 2, (crossings > 0).to(codes)), _PYRAMIDS),
     )
+    lefts: list[int] = []
     for column, (name, values, palette) in enumerate(panels):
         left = MARGIN + column * (panel + GAP)
         sheet.caption(name, left, sheet.top, panel)
         colors = torch.tensor([*palette.values(), _COLORS["boundary"]])
         sheet.image(_panel(vertices, topology, camera, size, values, colors), left, sheet.top + CAPTION)
-        _legend(sheet, values, palette, left, sheet.top + CAPTION + size[0], panel)
+        lefts.append(left)
+    legends = [_entries(values, palette) for _, values, palette in panels]
+    draw_legends(sheet, legends, lefts, sheet.top + CAPTION + size[0], panel)
     return sheet.write(path, overwrite=overwrite)
 
 
@@ -134,20 +138,7 @@ def _cells(vertices: Tensor, topology: Topology) -> tuple[Tensor, Topology]:
     return points, Topology.from_faces(quads, num_vertices=points.shape[0])
 
 
-def _legend(
-    sheet: Sheet, values: Tensor, palette: dict[str, tuple[float, float, float]], left: int, top: int, width: int
-) -> None:
-    """Coloured words with the number of vertices of each class, spread below a panel."""
-    present = [
-        (number, f"\N{BLACK SQUARE} {name} {int((values == number).sum())}") for number, name in enumerate(palette)
-    ]
-    present = [(number, words) for number, words in present if bool((values == number).any())]
-    room = sum(len(words) + 3 for _, words in present)
-    x = float(left)
-    for number, words in present:
-        red, green, blue = (round(255 * 0.72 * part) for part in list(palette.values())[number])
-        share = width * (len(words) + 3) / room
-        size = min(22.0, 1.6 * width / room)
-        color = f"#{red:02x}{green:02x}{blue:02x}"
-        sheet.text(words, x + share / 2, top + CAPTION / 2, size, color, ha="center", va="center")
-        x += share
+def _entries(values: Tensor, palette: dict[str, tuple[float, float, float]]) -> list[Entry]:
+    """The classes that there are, with the number of vertices of each."""
+    counts = [int((values == number).sum()) for number in range(len(palette))]
+    return [Entry(f"{name} {n}", color) for (name, color), n in zip(palette.items(), counts, strict=True) if n]

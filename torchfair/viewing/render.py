@@ -89,6 +89,7 @@ class MeshView:
         table = torch.cat([face_colors.new_tensor([background]), face_colors]).to(torch.float32)
         if edges is not None:
             lines, line_colors = self._lines(edges)
+            rim = self._rim(edges.rim) if edges.rim > 0 else None
         bands = []
         for band in self._bands():
             samples = table.index_select(0, (self.face_index[band] + 1).view(-1))
@@ -97,6 +98,10 @@ class MeshView:
                 covered = torch.nonzero(line >= 0).squeeze(1)
                 ink = line_colors.index_select(0, line[covered])
                 samples[covered] = torch.lerp(samples[covered], ink, edges.opacity)
+                if rim is not None:
+                    beside = torch.nonzero(rim[band].reshape(-1) & (line < 0)).squeeze(1)
+                    ink = edges.colors.to(samples).reshape(-1, 3)[:1]
+                    samples[beside] = torch.lerp(samples[beside], ink, edges.opacity)
             bands.append(self._average(samples))
         return torch.cat(bands)
 
@@ -147,6 +152,15 @@ class MeshView:
         surface = Surface(self.points, self.triangulation.triangles, self.triangle_index)
         lines = visible_lines(surface, self.topology.edges[order], widths[order])
         return lines, style.colors.to(device, torch.float32).expand(count, 3)[order]
+
+    def _rim(self, width: float) -> Tensor:
+        """Samples of the mesh within a distance, in pixels, of the background."""
+        reach = max(1, round(width * self.supersampling))
+        empty = (self.face_index < 0).to(torch.float32)[None, None]
+        for kernel in ((2 * reach + 1, 1), (1, 2 * reach + 1)):
+            padding = (kernel[0] // 2, kernel[1] // 2)
+            empty = torch.nn.functional.max_pool2d(empty, kernel, stride=1, padding=padding)
+        return (empty[0, 0] > 0) & (self.face_index >= 0)
 
     def _bands(self) -> Iterator[slice]:
         """The rows of samples, a whole number of pixel rows at a time."""

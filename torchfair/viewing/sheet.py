@@ -49,6 +49,7 @@ class Sheet:
         self.figure = Figure(figsize=(width / _DPI, self.height / _DPI), dpi=_DPI, facecolor="white")
         self.canvas = FigureCanvasAgg(self.figure)
         self._images: list[tuple[npt.NDArray[np.uint8], int, int]] = []
+        self._labels: list[tuple[str, float, float, float]] = []
         if title:
             size = min(30, 1.5 * width / len(title))  # long ones smaller, so that they fit
             style: dict[str, Any] = {"ha": "center", "va": "center", "weight": "bold", "parse_math": False}
@@ -62,6 +63,10 @@ class Sheet:
     def text(self, words: str, x: float, y: float, size: float = 22, color: str = TEXT, **style: Any) -> None:
         """Words at ``(x, y)``; ``size`` in pixels, ``style`` as for ``matplotlib.text.Text`` (``ha``, ``va``)."""
         self.figure.text(x / self.width, 1 - y / self.height, words, fontsize=size * 72 / _DPI, color=color, **style)
+
+    def label(self, words: str, x: float, y: float, size: float = 18) -> None:
+        """Words at ``(x, y)`` over pictures, on a light ground."""
+        self._labels.append((words, x, y, size))
 
     def caption(self, words: str, left: float, top: float, width: float) -> None:
         """Words in the middle of a line of captions."""
@@ -85,7 +90,23 @@ class Sheet:
         page = np.ascontiguousarray(np.asarray(self.canvas.buffer_rgba(), np.uint8)[..., :3])  # type: ignore[no-untyped-call]
         for picture, left, top in self._images:
             page[top : top + picture.shape[0], left : left + picture.shape[1]] = picture
-        return page
+        return self._with_labels(page) if self._labels else page
+
+    def _with_labels(self, page: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+        """The page with its labels over it."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(self.width / _DPI, self.height / _DPI), dpi=_DPI, facecolor="none")
+        canvas = FigureCanvasAgg(figure)
+        ground = {"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.72}
+        for words, x, y, size in self._labels:
+            place = x / self.width, 1 - y / self.height
+            figure.text(*place, words, fontsize=size * 72 / _DPI, color=TEXT, ha="center", va="center", bbox=ground)
+        canvas.draw()  # type: ignore[no-untyped-call]
+        over = np.asarray(canvas.buffer_rgba(), np.float64)  # type: ignore[no-untyped-call]
+        share = over[..., 3:] / 255.0
+        return np.asarray((page * (1.0 - share) + over[..., :3] * share).round(), np.uint8)
 
     def write(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> tuple[int, int]:
         """Writes the page as a PNG file, whole or not at all; returns its width and height.

@@ -112,6 +112,12 @@ def draw_points(axes: Axes, view: SphereView, points: Tensor, size: float, color
         axes.scatter(chosen[:, 0], chosen[:, 1], s=size**2, c=tint, linewidths=0, zorder=order)
 
 
+def draw_rings(axes: Axes, view: SphereView, points: Tensor, size: float, color: str) -> None:
+    """Rings of the given diameter (typographic points) around unit vectors ``(N, 3)``, on both halves."""
+    seen = (points.detach().to("cpu", torch.float64) @ view.axes.T).numpy()
+    axes.scatter(seen[:, 0], seen[:, 1], s=size**2, facecolors="none", edgecolors=color, linewidths=size / 8, zorder=6)
+
+
 def arc_pieces(points: Tensor, arcs: Tensor) -> list[Tensor]:
     """Great-circle arcs as polylines ``(n, k, 3)`` on the sphere, one tensor for short arcs and one for long ones."""
     points = points.detach().to("cpu", torch.float64)

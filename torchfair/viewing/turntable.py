@@ -18,7 +18,7 @@ from .shading import STRIPES_DARK
 from .view_direction import view_direction
 
 _ELEVATION = 38.0
-_MILLISECONDS = 80
+_TURN = 2880  # milliseconds
 _BANDS = 8
 _COLORS = 32
 
@@ -81,7 +81,7 @@ def turntable(
             progress(frame + 1)
     data = io.BytesIO()
     pictures[0].save(
-        data, "gif", save_all=True, append_images=pictures[1:], duration=_MILLISECONDS, loop=0, optimize=False
+        data, "gif", save_all=True, append_images=pictures[1:], duration=_TURN // frames, loop=0, optimize=False
     )
     atomic_write_bytes(path, data.getvalue(), overwrite=overwrite)
 

@@ -39,14 +39,28 @@ def view_direction(vertices: Tensor, topology: Topology) -> ViewDirection:
     off the middle of the long side; of the four such places the one from which the largest part of the surface shows
     the same side. Meshes without area are seen as if they were symmetric about z. The result is float64 on the CPU.
     """
+    area_vectors, areas, spread = _shape(vertices, topology)
+    return _three_quarter(area_vectors, spread, _up(area_vectors, areas, spread))
+
+
+def three_quarter_view(vertices: Tensor, topology: Topology, up: Tensor) -> ViewDirection:
+    """The same of one mesh ``(V, 3)`` with another direction up, a unit vector (3,) float64."""
+    area_vectors, _, spread = _shape(vertices, topology)
+    return _three_quarter(area_vectors, spread, up)
+
+
+def _shape(vertices: Tensor, topology: Topology) -> tuple[Tensor, Tensor, Tensor]:
+    """Area vectors, areas, and second moments of the area."""
     points = vertices.detach().to("cpu", torch.float64)
     topology = topology.to("cpu")
     points = torch.where(torch.isfinite(points), points, 0)
     area_vectors = face_area_vectors(points, topology)
     areas = torch.linalg.vector_norm(area_vectors, dim=-1)
     centres = points.new_zeros(topology.num_faces, 3).index_add_(0, topology.corner_faces, points[topology.corners])
-    spread = _spread(centres / topology.face_sizes[:, None], areas)
-    up = _up(area_vectors, areas, spread)
+    return area_vectors, areas, _spread(centres / topology.face_sizes[:, None], areas)
+
+
+def _three_quarter(area_vectors: Tensor, spread: Tensor, up: Tensor) -> ViewDirection:
     directions = _three_quarter_directions(up, spread)
     facing = area_vectors @ directions.T
     one_sided = facing.sum(0).abs() / facing.abs().sum(0).clamp(min=torch.finfo(torch.float64).tiny)

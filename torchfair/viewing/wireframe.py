@@ -12,6 +12,7 @@ from .lines import EdgeStyle
 from .render import MeshView
 
 _STRONG, _STRONGEST = 1.6, 2.6  # pixels
+_RIM = 0.8
 _INK = (0.10, 0.13, 0.19)
 
 
@@ -29,7 +30,7 @@ def quiet_edges(view: MeshView, strong: Tensor | None = None) -> EdgeStyle:
 
 
 def outline(view: MeshView) -> EdgeStyle:
-    """The boundary, and the edges where the surface turns away from the eye."""
+    """The boundary, the edges where the surface turns away from the eye, and where the mesh ends on the screen."""
     topology = view.topology
     widths = torch.zeros(topology.num_edges, dtype=torch.float64, device=view.points.device)
     to_eye = towards_eye(view.camera, face_centres(view.vertices, topology))
@@ -37,7 +38,7 @@ def outline(view: MeshView) -> EdgeStyle:
     left, right = topology.interior_edge_faces.unbind(1)
     widths[: topology.num_interior_edges] = 1.4 * (front[left] != front[right])
     widths[topology.num_interior_edges :] = 1.4
-    return EdgeStyle(torch.tensor(_INK), widths, opacity=0.8)
+    return EdgeStyle(torch.tensor(_INK), widths, opacity=0.8, rim=_RIM)
 
 
 def line_width(view: MeshView, share: float, thinnest: float, thickest: float) -> float:

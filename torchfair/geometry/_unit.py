@@ -31,7 +31,18 @@ def unit_of(vertices: Tensor) -> Tensor:
     if not positions.shape[-2]:
         return positions.new_ones(positions.shape[:-2])
     low, high = ordinary_extents(vertices.dtype)
-    return _unit((positions.amax(-2) - positions.amin(-2)).amax(-1), low, high)
+    coordinates = positions.mT.contiguous()  # twice as fast as reductions over rows
+    return _unit((coordinates.amax(-1) - coordinates.amin(-1)).amax(-1), low, high)
+
+
+def in_its_unit(vertices: Tensor) -> tuple[Tensor, Tensor]:
+    """``vertices`` (*batch, V, 3) divided by their :func:`unit_of`, and that unit (*batch, 1).
+
+    Values of the scaled mesh, one a vertex, an edge or a face, are to be multiplied by the unit as often as they are
+    lengths.
+    """
+    unit = unit_of(vertices)[..., None]
+    return vertices / unit[..., None], unit
 
 
 def _unit(extents: Tensor, low: float, high: float) -> Tensor:
