@@ -11,8 +11,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 FLOORS = (
     {"errors", "_interrupts", "_loading", "_precision", "_shown", "_solver_names", "_tables", "_threads"},
-    {"_names", "_numbers", "_ranges", "_tracing", "cameras", "linear", "progress", "rasterisation"},
-    {"_half_edges", "settings"},
+    {"_names", "_numbers", "_ranges", "_staged", "_tracing", "cameras", "linear", "progress", "rasterisation"},
+    {"_atomic", "_half_edges", "settings"},
     {"_connectivity", "projection"},
     {"topology"},
     {"_graph"},
@@ -21,6 +21,7 @@ FLOORS = (
     {"fields", "principal", "reflection", "self_intersections", "stars"},
     {"constraints", "measuring", "meshing", "viewing"},
     {"formfinding"},
+    {"design"},
     {"cli"},
 )
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}

@@ -76,6 +76,13 @@ def test_all_names_are_there_for_people_and_type_checkers() -> None:
         _ = torchfair.Topologie
 
 
+def test_the_page_of_a_design_does_not_wait_for_torch_and_nothing_for_its_compiler() -> None:
+    """The server computes nothing; and no decorator loads what only torch.compile needs, a second long."""
+    pytest.importorskip("websockets")
+    assert sorted({"torch", "scipy"} & modules_after("import torchfair.design.server")) == []
+    assert "torch._dynamo" not in modules_after("import torchfair.design.engine.worker")
+
+
 def test_star_and_parts_need_no_import_of_their_own() -> None:
     assert "torchfair.meshing" in modules_after("import torchfair; torchfair.meshing.principal_quads")
     assert "torch" in modules_after("from torchfair import *; Topology, load_mesh, NormalVariation")

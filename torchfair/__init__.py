@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from . import constraints as constraints
     from . import creases as creases
     from . import curves as curves
+    from . import design as design
     from . import energies as energies
     from . import errors as errors
     from . import fields as fields
@@ -77,8 +78,19 @@ _NAMES = {
     "topology": ("Topology",),
 }
 _PARTS = (
-    *("boundary", "cameras", "constraints", "creases", "curves", "energies", "errors", "fields", "formfinding"),
-    *("geometry", "io", "linear", "measuring", "meshing", "normalisation", "polylines", "principal", "progress"),
+    *("boundary", "cameras", "constraints", "creases", "curves", "design", "energies", "errors", "fields"),
+    *(
+        "formfinding",
+        "geometry",
+        "io",
+        "linear",
+        "measuring",
+        "meshing",
+        "normalisation",
+        "polylines",
+        "principal",
+        "progress",
+    ),
     *("projection", "rasterisation", "reflection", "repair", "self_intersections", "settings", "shapes", "stars"),
     *("subdivision", "topology", "triangulation", "viewing"),
 )

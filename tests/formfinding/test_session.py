@@ -387,3 +387,34 @@ def test_without_the_weight_of_quality_no_bound_of_faces_is_kept() -> None:
     assert not problem.guard.keeps_bounds({"vertices": thin})
     session.weigh(quality=0.0)
     assert problem.guard.keeps_bounds({"vertices": thin})
+
+
+def test_a_mesh_is_put_where_it_was_and_goes_on_from_there_beyond_the_limits_too() -> None:
+    session = opened()
+    session.place(session.recipe.given)
+    assert torch.equal(session.vertices, session.recipe.given)
+    drag(session)
+    session.settle()
+    away = session.vertices
+    fresh = opened()
+    fresh.place(away)
+    assert torch.allclose(fresh.vertices, away, rtol=0.0, atol=1e-12)
+    limit = fresh.recipe.settings.distance_limit
+    assert limit is not None
+    assert fresh.measures()["largest_distance_relative"] > limit  # where a barrier would be infinite
+    assert fresh.step().accepted
+    assert fresh.measures()["largest_distance_relative"] < session.measures()["largest_distance_relative"]
+    with pytest.raises(ShapeError):
+        fresh.place(away[:-1])
+
+
+def test_states_of_a_solve_are_watched() -> None:
+    session, seen = opened(), []
+    session.watch = lambda vertices: seen.append(vertices.clone())
+    session.solve()
+    assert torch.equal(seen[0], session.recipe.given)
+    assert any(torch.equal(vertices, session.vertices) for vertices in seen)
+    session.watch = None
+    count = len(seen)
+    session.settle()
+    assert len(seen) == count

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TextIO
 
 from .._interrupts import ended_like_ctrl_c
-from . import denoise, diagnose, fair, form, measure, mesh, reflect, subdivide, symmetric
+from . import denoise, design, diagnose, fair, form, measure, mesh, reflect, subdivide, symmetric
 from .errors import CommandError
 from .exit_codes import EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, EXIT_OK, EXIT_SIGNAL, IN_WORDS
 from .outcomes import outcome_of
@@ -19,7 +19,7 @@ from .several import run_inputs
 from .tellers import json_or_plain
 
 _JOBS = (fair.COMMAND, form.COMMAND, symmetric.COMMAND, denoise.COMMAND)
-_COMMANDS = (measure, diagnose, reflect, *_JOBS, mesh, subdivide)
+_COMMANDS = (measure, diagnose, reflect, *_JOBS, mesh, subdivide, design)
 _DESCRIPTION = "Visual smoothness of polyhedral surfaces: measure it, improve it."
 
 

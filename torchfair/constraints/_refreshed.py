@@ -13,13 +13,20 @@ from ..projection import ElementTerm
 from ..projection.checks import check_data
 
 
-@torch.compiler.disable  # type: ignore[untyped-decorator]
 def refreshed(term: ElementTerm, members: Tensor) -> list[Tensor]:
     """Data (B, n, ...) of a term at each of ``members`` (B, V, d), its one block; constant for derivatives.
 
     The search for closest points, and whatever users write, sees plain tensors (V, d), also under ``torch.func``: what
     it keeps for the next time holds no graph.
     """
+    if torch.compiler.is_compiling():  # as a decorator it would load the compiler, a second long, for everybody
+        uncompiled = torch.compiler.disable(_refreshed)  # type: ignore[no-untyped-call]
+        compiled: list[Tensor] = uncompiled(term, members)
+        return compiled
+    return _refreshed(term, members)
+
+
+def _refreshed(term: ElementTerm, members: Tensor) -> list[Tensor]:
     found = _Refreshed.apply(members.detach(), term)  # type: ignore[no-untyped-call]
     return [tensor.detach() for tensor in found]
 

@@ -7,9 +7,9 @@ Results and reports are JSON that every reader accepts. Files appear whole or no
 together.
 """
 
-from .atomic import atomic_write_bytes as atomic_write_bytes
-from .atomic import atomic_write_text as atomic_write_text
-from .atomic import written_together as written_together
+from .._atomic import atomic_write_bytes as atomic_write_bytes
+from .._atomic import atomic_write_text as atomic_write_text
+from .._atomic import written_together as written_together
 from .curve_points import CurvePoints as CurvePoints
 from .curve_points import load_curve as load_curve
 from .curve_points import load_curves as load_curves

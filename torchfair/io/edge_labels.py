@@ -10,10 +10,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from .._atomic import atomic_write_text
 from .._graph import edge_numbers
 from ..errors import MeshFileError, ShapeError
 from ..topology import Topology
-from .atomic import atomic_write_text
 from .obj import obj_words, statement_rows, vertex_numbers
 from .raw_mesh import Ints
 from .reading import read_bytes

@@ -7,7 +7,7 @@ import platform
 from collections.abc import Mapping
 from typing import Any
 
-from .atomic import atomic_write_text
+from .._atomic import atomic_write_text
 from .json_text import to_json
 
 

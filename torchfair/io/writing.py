@@ -10,11 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from .._atomic import atomic_write_bytes
 from .._half_edges import first_few
 from ..errors import MeshError, MeshFileError, ShapeError
 from ..topology import Topology
 from . import others
-from .atomic import atomic_write_bytes
 from .obj import write_obj
 from .obj_attributes import ObjAttributes
 from .off import write_off

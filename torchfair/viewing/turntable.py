@@ -9,8 +9,8 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from .._atomic import atomic_write_bytes
 from ..cameras import OrthographicCamera
-from ..io.atomic import atomic_write_bytes
 from ..reflection import Stripes, render_reflection, ring_directions
 from ..reflection.smooth_reference import SmoothReference, one_finite_mesh
 from ..topology import Topology

@@ -94,6 +94,10 @@ class FairRecipe(Recipe[FairSettings]):
         """Where a handle leaves the reference surface, that is given up."""
         self.problem.reconsider()
 
+    def put_at(self, state: State) -> None:
+        """Vertices beyond the distance limit may not go farther away than they are."""
+        self.problem.near.lift(self.placed(state))
+
     def snapshot(self) -> Callable[[], None]:
         """Puts back whether the reference surface is given up."""
         return self.problem.snapshot()
@@ -109,9 +113,9 @@ class FairRecipe(Recipe[FairSettings]):
         settings = replace(self.settings.projection, least_extrapolation=math.inf, least_uncorrected_gain=0.0)
         return self.problem.stage(state, 1.0, 1.0, settings)
 
-    def state(self) -> State:
-        """The start, with auxiliary variables that fit it."""
-        return self.problem.blocks(self.start)
+    def blocks(self, vertices: Tensor) -> State:
+        """With auxiliary variables that fit."""
+        return self.problem.blocks(vertices)
 
     def placed(self, state: State) -> Tensor:
         """Gliding vertices are put on their curves."""

@@ -97,7 +97,16 @@ class Recipe(ABC, Generic[S]):
 
     def state(self) -> State:
         """Variable blocks at the start."""
-        return {"vertices": self.start}
+        return self.blocks(self.start)
+
+    def state_at(self, vertices: Tensor) -> State:
+        """Variable blocks for vertices (V, 3) in the unit of the input; those that no face uses stay out of the way."""
+        unused = (self.topology.valences == 0)[:, None]
+        return self.blocks(torch.where(unused, self.start, self.unit.apply(vertices)))
+
+    def blocks(self, vertices: Tensor) -> State:
+        """Variable blocks that fit vertices (V, 3) in the unit of the problem."""
+        return {"vertices": vertices}
 
     def placed(self, state: State) -> Tensor:
         """The vertices (V, 3) of the mesh of a state."""
@@ -144,6 +153,9 @@ class Recipe(ABC, Generic[S]):
 
     def reconsider(self) -> None:
         """Called after handles or held vertices have changed, for decisions that depend on them."""
+
+    def put_at(self, state: State) -> None:
+        """Called once a mesh was put elsewhere, for bounds that it does not keep there: it may come back to them."""
 
     def check_pulls(self, vertices: Tensor, targets: Tensor) -> None:
         """Refuses handles (n,) with targets (n, 3), in the unit of the input, that cannot be reached."""

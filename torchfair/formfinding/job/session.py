@@ -84,6 +84,8 @@ class Session(Generic[R]):
     Attributes:
         state: The blocks found so far, normalised.
         runs: Every run of guided projection so far.
+        watch: Called with the vertices (V, 3) of every state that :meth:`settle` and :meth:`solve` pass through, in the
+            unit of the input; None for nobody.
 
     Example::
 
@@ -99,6 +101,7 @@ class Session(Generic[R]):
         recipe.pulls.everywhere = live
         self.state: State = recipe.state()
         self.runs: list[ProjectionResult] = []
+        self.watch: Callable[[Tensor], None] | None = None
         self._problems = CompiledProblems()
         self._following: _Following | None = None
         self._moved = False
@@ -137,6 +140,18 @@ class Session(Generic[R]):
         self.recipe.pulls.free(vertex_numbers(vertices, self.recipe.topology))
         self.recipe.reconsider()
         self._moved = True
+
+    def place(self, vertices: Tensor) -> None:
+        """Puts the mesh where it is told to be, (V, 3) in the unit of the input, such as where it was before.
+
+        Handles, held vertices and weights stay; so does what is compiled.
+        """
+        self.recipe.topology.check_vertices(vertices)
+        self.state = self.recipe.state_at(vertices.to("cpu", torch.float64))
+        self.recipe.forget()
+        self.recipe.reconsider()
+        self.recipe.put_at(self.state)
+        self._following, self._moved = None, True
 
     def weigh(self, **weights: float) -> None:
         """Changes weights of the settings by their names, such as ``fairness=0.1``; index maps and analysis are kept.
@@ -265,9 +280,14 @@ class Session(Generic[R]):
             stage.blocks,
             settings=replace(settings, solver="auto"),
             callback=self.callback,
-            observe=lambda state: self.recipe.observe(stage.result(state)),
+            observe=lambda state: self._observe(stage.result(state)),
             guard=stage.guard,
         )
+
+    def _observe(self, state: State) -> dict[str, float]:
+        if self.watch is not None:
+            self.watch(self.recipe.vertices(state))
+        return self.recipe.observe(state)
 
     def _ended(self, run: ProjectionResult, watch: Stopwatch) -> bool:
         limit = self.recipe.settings.projection.time_limit

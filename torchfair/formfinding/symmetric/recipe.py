@@ -125,9 +125,9 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
             return super().settling(state, damping)
         return SettlingPlan(self.problem, state, self.rounds or self.settings.rounds, damping)
 
-    def state(self) -> State:
-        """The start, with auxiliary variables that fit it."""
-        return self.problem.blocks(self.start)
+    def blocks(self, vertices: Tensor) -> State:
+        """With auxiliary variables that fit."""
+        return self.problem.blocks(vertices)
 
     def stays(self) -> Tensor:
         """Fixed vertices, with those of the boundary if the settings say so, and isolated ones."""

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import MeshFileError
+from .errors import MeshFileError
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
-from .staged import StagedFile, drop, staged, take_names
+from ._staged import StagedFile, drop, staged, take_names
 
 _WAITING: ContextVar[list[StagedFile] | None] = ContextVar("files that wait for each other", default=None)
 

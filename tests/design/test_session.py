@@ -1,0 +1,495 @@
+"""A design as its users see it: drags, weights, modes, undo, windows, a lost engine; computed in truth."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from design_tools import Bench, failures
+from hostile_messages import texts
+
+from torchfair import Topology, load_mesh
+from torchfair.design.commands import CommandRefused, read_command
+from torchfair.design.containers import AT_REST, DRAGGING, JUMP
+from torchfair.design.effects import Ask, Autosave, Deliver, Tell, Wake
+from torchfair.design.engine import requests as r
+from torchfair.design.engine import saying as say
+from torchfair.design.states import DesignState
+from torchfair.energies import normal_variation
+from torchfair.formfinding import condition_residuals
+from torchfair.principal import PrincipalEdges
+
+S = DesignState
+HANDLE, OTHER, THIRD = 30, 18, 42
+
+
+def pulled(bench: Bench, vertex: int = HANDLE, outwards: float = 0.1) -> list[float]:
+    """A place outside the tube."""
+    place = bench.vertices[vertex].copy()
+    place[:2] *= 1.0 + outwards
+    return [float(value) for value in place]
+
+
+def drag(bench: Bench, vertex: int = HANDLE, outwards: float = 0.1) -> list[float]:
+    """Pulls a handle in two moves and lets it go."""
+    start, end = bench.vertices[vertex].copy(), np.array(pulled(bench, vertex, outwards))
+    for share in (0.5, 1.0):
+        place = (1.0 - share) * start + share * end
+        bench.say(type="move", places=[[vertex, *map(float, place)]], count=int(2 * share))
+    bench.say(type="release", id=1)
+    assert not bench.errors
+    return end.tolist()
+
+
+def topology_of(bench: Bench) -> Topology:
+    faces = bench.session.history.now.faces
+    return Topology.from_packed_faces(faces.corners, faces.offsets, len(bench.vertices))
+
+
+def last(bench: Bench, kind: str) -> Any:
+    return bench.messages(kind)[-1]
+
+
+def test_what_is_opened_is_told_and_nothing_has_moved(bench: Bench, tube: Path) -> None:
+    mesh = load_mesh(tube)
+    assert bench.session.state is S.READY
+    message, arrays = last(bench, "topology")
+    counts = (mesh.topology.num_vertices, mesh.topology.num_faces, mesh.topology.num_edges)
+    assert (message["vertices"], message["faces"], message["edges"]) == counts
+    assert np.array_equal(arrays["corners"], mesh.topology.corners.numpy())
+    assert np.array_equal(arrays["edges"].reshape(-1, 2), mesh.topology.edges.numpy())
+    assert np.array_equal(arrays["boundary"], mesh.topology.is_boundary_vertex.numpy())
+    frame = bench.frames[-1]
+    assert np.array_equal(frame.vertices, mesh.vertices.numpy())
+    assert frame.flags == AT_REST | JUMP
+    assert frame.topology == message["topology"]
+    assert last(bench, "numbers")["E"] == pytest.approx(float(normal_variation(mesh.vertices, mesh.topology)))
+    assert last(bench, "numbers")["deviation"] == pytest.approx(0.0, abs=1e-12)
+    start = arrays["start"].reshape(-1, 3) + np.array(message["origin"])
+    assert np.allclose(start, mesh.vertices.numpy(), atol=1e-6)
+    assert not bench.worker.waits()
+
+
+def test_left_and_right_faces_of_edges_are_those_that_pages_draw(bench: Bench) -> None:
+    _, arrays = last(bench, "topology")
+    faces = [
+        arrays["corners"][a:b].tolist() for a, b in zip(arrays["offsets"][:-1], arrays["offsets"][1:], strict=True)
+    ]
+    pairs = zip(arrays["edges"].reshape(-1, 2).tolist(), arrays["edge_faces"].reshape(-1, 2).tolist(), strict=True)
+    for (v, w), (left, right) in pairs:
+        assert w == faces[left][(faces[left].index(v) + 1) % 3]
+        assert right == -1 or v == faces[right][(faces[right].index(w) + 1) % 3]
+
+
+def test_marks_of_the_file_are_principal_edges(bench: Bench) -> None:
+    message, arrays = last(bench, "topology")
+    assert message["principal_edges"] == int((arrays["labels"] & 1).sum()) > 0
+
+
+def test_a_handle_is_followed_and_comes_to_rest_where_it_is_pulled(bench: Bench) -> None:
+    before = last(bench, "numbers")["E"]
+    target = drag(bench)
+    assert bench.session.state is S.READY
+    assert np.linalg.norm(bench.vertices[HANDLE] - target) < 0.05 * last(bench, "numbers")["mean_edge"]
+    moving = [frame for frame in bench.frames if frame.flags & DRAGGING]
+    assert {frame.count for frame in moving} == {1, 2}
+    assert np.array_equal(bench.frames[-1].vertices, bench.vertices)
+    assert bench.frames[-1].flags == AT_REST
+    assert last(bench, "numbers")["E"] != before
+    assert last(bench, "numbers")["handle_distance"] == pytest.approx(
+        float(np.linalg.norm(bench.vertices[HANDLE] - target))
+    )
+    assert last(bench, "handles")["handles"] == [{"vertex": HANDLE, "target": pytest.approx(target)}]
+    assert {"type": "done", "id": 1} in bench.told
+    assert not bench.worker.waits()
+
+
+def test_undo_and_redo_are_equal_to_the_bit(bench: Bench) -> None:
+    states = [bench.vertices]
+    for vertex in (HANDLE, OTHER, THIRD):
+        drag(bench, vertex)
+        states.append(bench.vertices)
+    for state in states[-2::-1]:
+        bench.say(type="undo")
+        assert np.array_equal(bench.vertices, state)
+        assert np.array_equal(bench.frames[-1].vertices, state)
+        assert bench.frames[-1].flags == AT_REST | JUMP
+    bench.say(type="undo")
+    assert bench.errors == ["there is nothing to undo"]
+    for state in states[1:]:
+        bench.say(type="redo")
+        assert np.array_equal(bench.frames[-1].vertices, state)
+    assert [entry["vertex"] for entry in last(bench, "handles")["handles"]] == [HANDLE, OTHER, THIRD]
+
+
+@pytest.mark.slow
+def test_what_follows_undo_is_what_would_have_followed(bench: Bench) -> None:
+    drag(bench, OTHER)
+    drag(bench, HANDLE)
+    first = bench.vertices
+    bench.say(type="undo")
+    drag(bench, HANDLE)
+    assert np.abs(bench.vertices - first).max() < 1e-3
+
+
+def test_escape_puts_everything_back_to_the_bit(bench: Bench) -> None:
+    drag(bench, OTHER)
+    before, handles = bench.vertices, last(bench, "handles")
+    bench.say(type="move", places=[[HANDLE, *pulled(bench, HANDLE, 0.3)]])
+    bench.say(type="release", back=True)
+    assert bench.session.history.position == 1
+    assert np.array_equal(bench.frames[-1].vertices, before)
+    assert last(bench, "handles") == handles
+    assert bench.session.state is S.READY
+
+
+def test_typed_coordinates_are_one_edit(bench: Bench) -> None:
+    target = pulled(bench)
+    bench.say(type="move", places=[[HANDLE, *target]], release=True, id=3)
+    assert bench.session.history.position == 1
+    assert bench.session.history.now.words == f"drag vertex {HANDLE}"
+    assert np.linalg.norm(bench.vertices[HANDLE] - target) < 0.05 * last(bench, "numbers")["mean_edge"]
+
+
+def test_several_handles_move_together(bench: Bench) -> None:
+    places = {vertex: pulled(bench, vertex) for vertex in (28, 30, 32)}
+    bench.say(type="move", places=[[vertex, *place] for vertex, place in places.items()])
+    bench.say(type="release")
+    for vertex, place in places.items():
+        assert np.linalg.norm(bench.vertices[vertex] - place) < 0.05 * last(bench, "numbers")["mean_edge"]
+
+
+def test_fixed_vertices_stay_and_freed_ones_go(bench: Bench) -> None:
+    near = sorted(set(range(24, 37)) - {HANDLE})
+    bench.say(type="hold", vertices=near)
+    before = bench.vertices
+    drag(bench)
+    assert np.array_equal(bench.vertices[near], before[near])
+    bench.say(type="free", vertices=near)
+    assert bench.session.history.now.held == ()
+    assert not np.array_equal(bench.vertices[near], before[near])
+    assert last(bench, "handles")["held"] == []
+
+
+def test_weights_act_while_they_are_turned(bench: Bench) -> None:
+    drag(bench, outwards=0.3)
+    rough = bench.vertices
+    bench.say(type="weigh", weights={"fairness": 30.0})
+    assert bench.session.state is S.DRAGGING
+    bench.say(type="release")
+    assert bench.session.history.now.words == "weigh fairness 30"
+    assert np.abs(bench.vertices - rough).max() > 1e-4
+    weights = {weight["name"]: weight["value"] for weight in last(bench, "settings")["weights"]}
+    assert weights["fairness"] == 0.3
+    bench.say(type="hold", vertices=[0])
+    weights = {weight["name"]: weight["value"] for weight in last(bench, "settings")["weights"]}
+    assert weights["fairness"] == 30.0
+    bench.say(type="weigh", weights={"strange": 1.0})
+    bench.say(type="weigh", weights={"fairness": 1e9})
+    assert ["weights are" in error or "goes from" in error for error in bench.errors] == [True, True]
+
+
+@pytest.mark.slow
+def test_the_boundary_stays_glides_or_is_free(bench: Bench) -> None:
+    rim = topology_of(bench).is_boundary_vertex.numpy()
+    drag(bench, 14, 0.2)
+    for choice, moves, leaves in (("fixed", False, False), ("glide", True, False), ("free", True, True)):
+        bench.say(type="undo")
+        before = bench.vertices
+        bench.say(type="choose", choices={"boundary": choice})
+        drag(bench, 14, 0.2)
+        ways = np.abs(bench.vertices - before)[rim]
+        assert bool(ways.max() > 1e-9) == moves
+        assert bool(ways[:, 2].max() > 1e-6) == leaves, choice
+
+
+def test_a_pause_holds_the_mesh_while_handles_move(bench: Bench) -> None:
+    before = bench.vertices
+    bench.say(type="pause", on=True)
+    places = [[HANDLE, *pulled(bench)]]
+    serial = bench.session._core.serial
+    bench.carry_out(bench.session.command(1, read_command('{"type": "move", "places": %s}' % str(places))))  # noqa: UP031
+    bench.carry_out(bench.session.command(1, read_command('{"type": "pause", "on": false}')))
+    request = bench.pipe.waiting[0]
+    assert isinstance(request, r.Drag)
+    frames = len(bench.frames)
+    bench.pipe.waiting.appendleft(r.Pause(serial, True))
+    bench.run()
+    assert len(bench.frames) > frames
+    bench.say(type="release")
+    assert not np.array_equal(bench.vertices, before)
+
+
+def test_modes_go_on_from_where_the_mesh_is(bench: Bench) -> None:
+    drag(bench)
+    places = bench.vertices
+    bench.say(type="mode", mode="form")
+    assert np.array_equal(bench.vertices, places)
+    assert bench.session.history.now.mode == "form"
+    bench.say(type="free", vertices=[HANDLE])
+    bench.say(type="undo")
+    bench.say(type="undo")
+    assert np.array_equal(bench.vertices, places)
+    assert bench.session.history.now.mode == "fair"
+    assert not failures(bench)
+
+
+def test_a_symmetric_design_meets_its_conditions_after_a_drag(bench: Bench) -> None:
+    bench.say(type="mode", mode="symmetric")
+    drag(bench, HANDLE, 0.1)
+    document = bench.session.history.now
+    edges = PrincipalEdges(topology_of(bench), torch.from_numpy(document.principal))
+    residuals = condition_residuals(torch.from_numpy(bench.vertices.copy()), edges, edges.stars())
+    assert all(float(values.max()) < 1e-8 for values in residuals.values())
+    strips = bench.say(type="strips", id=9)
+    message, arrays = next(m for m in strips if isinstance(m, tuple) and m[0]["type"] == "strips")
+    assert message["planarity"] < 1e-6
+    assert arrays["outlines"].size == 2 * sum(strip["outline"][1] for strip in message["strips"])
+
+
+def test_refined_meshes_carry_handles_and_marks_and_undo_leads_back(bench: Bench) -> None:
+    bench.say(type="hold", vertices=[40])
+    target = drag(bench)
+    coarse = bench.session.history.now
+    bench.say(type="subdivide")
+    fine = bench.session.history.now
+    assert fine.count > 3 * coarse.count
+    assert fine.coarse is coarse
+    assert fine.handles[HANDLE] == pytest.approx(target)
+    assert fine.held[0] == 40
+    assert last(bench, "topology")[0]["principal_edges"] > 1.9 * int(coarse.principal.sum())
+    bench.say(type="settle")
+    rested = bench.vertices
+    bench.say(type="undo")
+    bench.say(type="undo")
+    assert np.array_equal(bench.frames[-1].vertices, coarse.vertices)
+    assert last(bench, "topology")[0]["vertices"] == coarse.count
+    bench.say(type="redo")
+    bench.say(type="redo")
+    assert np.array_equal(bench.frames[-1].vertices, rested)
+    assert not failures(bench)
+
+
+def test_the_surface_becomes_principal_quads_and_work_goes_on(bench: Bench) -> None:
+    bench.say(type="mesh", kind="quads", count=40, id=2)
+    message, arrays = last(bench, "topology")
+    assert set(np.diff(arrays["offsets"]).tolist()) == {4}
+    assert not message["triangular"]
+    drag(bench, 12, 0.05)
+    assert {"type": "done", "id": 2} in bench.told
+    bench.say(type="mode", mode="symmetric")
+    assert "triangles" in bench.errors[-1]
+    assert bench.session.state is S.READY
+
+
+def test_what_the_job_refuses_is_a_sentence_and_everything_is_as_it_was(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, r.Open(0, "example:torus"))
+    before = bench.session.history.now
+    bench.say(type="mode", mode="form", id=4)
+    assert "boundary" in bench.errors[-1] or "closed" in bench.errors[-1]
+    assert bench.session.history.now is before
+    assert bench.session.state is S.READY
+    assert "boundary" in last(bench, "state")["modes"][1]["refused"]
+
+
+def test_handles_that_are_none_are_refused(bench: Bench) -> None:
+    count = len(bench.vertices)
+    bench.say(type="move", places=[[count, 0, 0, 0]])
+    bench.say(type="move", places=[[0, 1e12, 0, 0]])
+    bench.say(type="hold", vertices=[count])
+    assert [f"0 to {count - 1}" in error or "sizes" in error for error in bench.errors] == [True, True, True]
+    assert bench.session.state is S.READY
+
+
+# ---- windows ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_second_window_is_told_everything_and_the_first_that_it_is_there(bench: Bench) -> None:
+    drag(bench)
+    bench.session.command(1, read_command('{"type": "watch", "views": ["planarity"]}'))
+    effects = bench.session.window_opened(2)
+    to_second = [e for e in effects if isinstance(e, Tell) and e.window == 2]
+    kinds = [e.message["type"] if isinstance(e.message, dict) else "container" for e in to_second]
+    assert kinds == ["state", "settings", "container", "handles", "numbers"]
+    assert [e.message["windows"] for e in effects if isinstance(e, Tell) and e.window == 1] == [2]  # type: ignore[call-overload]
+
+
+def test_only_one_window_drags_and_what_it_leaves_behind_is_let_go(bench: Bench) -> None:
+    bench.session.window_opened(2)
+    place = [HANDLE, *pulled(bench)]
+    bench.say(type="move", places=[place])
+    bench.say(2, type="move", places=[place])
+    bench.say(2, type="release")
+    assert bench.errors == ["another window drags"] * 2
+    (wake,) = [e for e in bench.session.window_closed(1) if isinstance(e, Wake)]
+    assert wake.seconds == 2.0
+    bench.carry_out(bench.session.awoken(wake.why))
+    bench.run()
+    assert bench.session.state is S.READY
+    assert bench.session.history.position == 1
+    assert bench.session.awoken(wake.why) == []
+
+
+def test_a_move_while_the_mesh_settles_is_another_edit(bench: Bench) -> None:
+    bench.say(type="move", places=[[HANDLE, *pulled(bench)]])
+    for text in ('{"type": "release"}', '{"type": "move", "places": [[18, 1.2, 0, 0]]}'):
+        bench.carry_out(bench.session.command(1, read_command(text)))
+    bench.run()
+    assert bench.session.state is S.DRAGGING
+    bench.say(type="release")
+    history = bench.session.history
+    assert [state.words for state in history.states] == ["open", f"drag vertex {HANDLE}", "drag vertex 18"]
+    assert set(history.now.handles) == {HANDLE, OTHER}
+
+
+# ---- the engine ------------------------------------------------------------------------------------------------------
+
+
+def test_a_lost_engine_comes_back_with_the_last_settled_shape(bench: Bench) -> None:
+    drag(bench, OTHER)
+    settled = bench.session.history.now
+    bench.say(type="move", places=[[HANDLE, *pulled(bench)]])
+    bench.pipe.waiting.clear()
+    bench.carry_out(bench.session.engine_lost())
+    assert bench.session.state is S.LOST
+    assert bench.starts == 2
+    bench.worker = bench._worker()
+    bench.carry_out(bench.session.engine_said(say.Started(0)))
+    assert bench.session.state is S.RESTORING
+    bench.run()
+    assert bench.session.state is S.READY
+    assert bench.session.history.now is settled
+    assert np.array_equal(bench.frames[-1].vertices, settled.vertices)
+    assert "engine has ended" in last(bench, "notice")["sentence"]
+    drag(bench, HANDLE)
+    assert set(bench.session.history.now.handles) == {OTHER, HANDLE}
+
+
+def test_what_an_engine_says_late_is_not_heard(bench: Bench) -> None:
+    drag(bench)
+    now = bench.session.history.now
+    for event in (say.Done(1, now.start), say.Failed(2, "old"), say.Made(1, (now,)), say.Answered(1, b"")):
+        assert bench.session.engine_said(event) == []
+    assert bench.session.history.now is now
+
+
+def test_stopping_what_cannot_be_cut_short_gives_the_engine_up(bench: Bench) -> None:
+    effects = bench.session.command(1, read_command('{"type": "mesh", "kind": "quads", "count": 50, "id": 8}'))
+    assert [type(e.request) for e in effects if isinstance(e, Ask)] == [r.Remake]
+    bench.carry_out(bench.session.command(1, read_command('{"type": "stop"}')))
+    assert bench.session.state is S.LOST
+    assert bench.starts == 2
+    assert "nothing has changed" in last(bench, "error")["sentence"]
+
+
+def test_a_solve_is_stopped_with_the_best_so_far(bench: Bench) -> None:
+    drag(bench)
+    for text in ('{"type": "solve", "id": 1}', '{"type": "stop"}'):
+        bench.carry_out(bench.session.command(1, read_command(text)))
+    bench.run()
+    assert bench.session.state is S.READY
+    assert bench.session.history.now.words == "solve"
+
+
+@pytest.mark.slow
+def test_weights_that_are_turned_during_a_solve_count(bench: Bench) -> None:
+    drag(bench, outwards=0.3)
+    fresh = bench.session.history.now
+    bench.say(type="solve")
+    without = bench.vertices
+    bench.say(type="undo")
+    assert bench.session.history.now is fresh
+    for text in ('{"type": "solve"}', '{"type": "weigh", "weights": {"fairness": 20.0}}'):
+        bench.carry_out(bench.session.command(1, read_command(text)))
+    bench.run()
+    assert bench.session.history.now.weights == {"fair": {"fairness": 20.0}}
+    assert np.abs(bench.vertices - without).max() > 1e-4
+
+
+# ---- files -----------------------------------------------------------------------------------------------------------
+
+
+def test_meshes_are_saved_as_they_are(bench: Bench, tmp_path: Path) -> None:
+    drag(bench)
+    bench.say(type="save", format="obj", to="download", name="shape", id=7)
+    delivered = next(e for e in bench.stored if isinstance(e, Deliver))
+    assert delivered.name == "shape.obj"
+    path = tmp_path / "again.obj"
+    path.write_bytes(delivered.content())
+    assert np.array_equal(load_mesh(path).vertices.numpy(), bench.vertices)
+
+
+def test_a_session_file_brings_everything_back(bench: Bench, tmp_path: Path) -> None:
+    bench.say(type="hold", vertices=[3])
+    drag(bench)
+    bench.say(type="subdivide")
+    bench.say(type="hold", vertices=[5])
+    bench.say(type="undo")
+    camera = {
+        "position": [0.0, 0.0, 5.0], "target": [0.0, 0.0, 0.0], "up": [0.0, 1.0, 0.0], "fov": 40.0,
+        "orthographic": False,
+    }  # fmt: skip
+    bench.say(type="camera", camera=camera)
+    assert not last(bench, "state")["saved"]
+    bench.say(type="save", format="session", to="download", id=7)
+    assert last(bench, "state")["saved"]
+    data = next(e for e in bench.stored if isinstance(e, Deliver)).content()
+    again = Bench(tmp_path)
+    again.say(type="upload", name="tube.torchfair", bytes=data)
+    assert again.errors == []
+    old, new = bench.session.history, again.session.history
+    assert (len(new.states), new.position) == (len(old.states), old.position)
+    for one, other in zip(old.states, new.states, strict=True):
+        assert np.array_equal(one.vertices, other.vertices)
+        assert (one.handles, one.held, one.weights, one.words) == (
+            other.handles,
+            other.held,
+            other.weights,
+            other.words,
+        )
+    assert json.dumps(last(again, "camera")["camera"]) == json.dumps(camera)
+    assert last(again, "state")["saved"]
+    again.say(type="redo")
+    assert np.array_equal(again.frames[-1].vertices, old.states[-1].vertices)
+    assert again.session.history.now.held[:2] == (3, 5)
+
+
+def test_every_edit_is_kept_safe_until_it_is_saved(bench: Bench) -> None:
+    assert not [e for e in bench.stored if isinstance(e, Autosave)]
+    drag(bench)
+    assert bench.stored[-1].content is not None  # type: ignore[union-attr]
+    bench.say(type="save", format="session", to="download")
+    assert bench.stored[-1] == Autosave(None)
+
+
+def state_of(bench: Bench) -> Any:
+    core = bench.session._core
+    dragged = None if core.drag is None else core.drag.document
+    return (core.state, core.pending, dragged, core.serial, core.paused, core.history.states, core.history.position)
+
+
+# ---- hostile pages ---------------------------------------------------------------------------------------------------
+
+
+def test_ten_thousand_hostile_messages_change_nothing_unless_they_are_allowed(bench: Bench) -> None:
+    """Those that would change something are real commands; all others leave the design as it was."""
+    drag(bench)
+    refused = 0
+    for text in texts(10_000, seed=1):
+        try:
+            command = read_command(text)
+        except CommandRefused:
+            refused += 1
+            continue
+        if command.type in ("hello", "ack"):
+            continue
+        was = state_of(bench)
+        effects = bench.session.command(1, command)
+        if any(isinstance(e, Tell) and isinstance(e.message, dict) and e.message["type"] == "error" for e in effects):
+            assert state_of(bench) == was
+            refused += 1
+    assert refused > 3_000
