@@ -46,18 +46,16 @@ def refuse_one_table(arguments: argparse.Namespace) -> None:
 
 def table_writers(arguments: argparse.Namespace) -> dict[Path, Callable[[Path, Any, Any, bool], object]]:
     """Writers of the tables of a result, whose file is OUTPUT."""
-    from ..io import numbers_from
-
-    first = numbers_from(arguments.output)
-    return {path: partial(_write, text, first) for path, text in tables_of(arguments).items()}
+    return {path: partial(_write, text, arguments.output) for path, text in tables_of(arguments).items()}
 
 
 def _write(
-    text: Callable[[Tensor, Topology, Names], str], first: int, path: Path, request: Any, result: Any, overwrite: bool
+    text: Callable[[Tensor, Topology, Names], str], mesh: str, path: Path, request: Any, result: Any, overwrite: bool
 ) -> None:
     from .._names import Names
+    from ..io import numbers_from
 
-    write_table(path, text(result.vertices, result.topology, Names(first)), overwrite=overwrite)
+    write_table(path, text(result.vertices, result.topology, Names(numbers_from(mesh))), overwrite=overwrite)
 
 
 def write_table(path: Path, text: str, *, overwrite: bool) -> None:
