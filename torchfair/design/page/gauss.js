@@ -29,7 +29,8 @@ export class Gauss {
     this.corner = [0, 0]; // from the left and bottom, in pixels
     this.uniforms = {
       forward: uniforms.forward, ballColour: { value: null }, ballRim: { value: null } };
-    this.shared = { ...lineUniforms, table: uniforms.faceTable };
+    this.ink = { value: null };
+    this.shared = { ...lineUniforms, table: uniforms.faceTable, ink: this.ink };
     this.ball = new Drawn(new SphereGeometry(1, 48, 32), new RawShaderMaterial({
       ...BALL, glslVersion: GLSL3, uniforms: this.uniforms, depthTest: false }));
     this.ball.frustumCulled = false;

@@ -26,6 +26,7 @@ export function applyLook({ scene, store }) {
   edges.uniforms.paint.value = look.lines ?? LineColour.INK;
   edges.uniforms.width.value = look.lines === LineColour.SCALE ? 2.2 : look.paint === Paint.FLAT ? 1.4 : 1.1;
   edges.uniforms.opacity.value = look.paint === Paint.FLAT ? 0.95 : look.paint === Paint.MIRROR ? 0.22 : 0.5;
+  if (scene.inks) u.ink.value.copy(look.paint === Paint.FLAT ? scene.inks.wire : scene.inks.edge);
   edges.object.visible = store.lines || Boolean(look.lines) || look.paint === Paint.FLAT;
   u.palette.value = look.name === "stars" ? palettes().stars : palettes()[look.scale ?? "fire"];
   scene.gauss.visible = store.sphere;

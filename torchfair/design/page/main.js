@@ -59,7 +59,7 @@ class App {
     store.on("look lines sphere topology views", () => applyLook(this));
     store.on("look edgeLimit views topology scheme", () => showLegend(this));
     store.on("look", () => this.watch());
-    store.on("scheme", () => { keepScheme(store.scheme); applyScheme(this); });
+    store.on("scheme", () => { keepScheme(store.scheme); applyScheme(this); applyLook(this); });
     store.on("handles held selection hover hoverFace frame topology look views before pulling scheme", () => applyMarks(this));
     store.on("before", () => scene.showBefore(store.before));
     store.on("numbers state", () => { showNumbers(this); showWorst(this); });

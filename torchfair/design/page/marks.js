@@ -11,7 +11,8 @@ export function applyMarks({ scene, store, handles }) {
   if (!store.before) {
     for (const v of store.held) dot(mesh.point(v), marked.held, 9);
     for (const [v, target] of store.handles) dot(handles.pull?.starts.has(v) ? target : mesh.point(v), marked.accent, 11);
-    for (const v of store.selection) dot(handles.place(v), store.held.has(v) ? marked.held : marked.accent, 14);
+    const size = store.selection.size > 20 ? 9 : 14;
+    for (const v of store.selection) dot(handles.place(v), store.held.has(v) ? marked.held : marked.accent, size);
     const { hover } = store;
     if (hover !== null && !store.pulling && hover < mesh.numVertices) dot(mesh.point(hover), marked.hover, 13);
     if (store.hoverFace !== null) for (const v of mesh.faceCorners(store.hoverFace)) dot(mesh.point(v), marked.hover, 7);

@@ -46,7 +46,8 @@ export class Picker {
   }
 
   read({ left, low, columns, rows }) {
-    const bytes = new Uint8Array(4 * columns * rows);
+    const bytes = new Uint8Array(4 * columns * rows), gl = this.scene.renderer.getContext();
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null); // a look of `later` may still be on its way
     if (bytes.length) this.scene.renderer.readRenderTargetPixels(this.target, left, low, columns, rows, bytes);
     return numbers(bytes);
   }

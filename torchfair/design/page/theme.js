@@ -19,6 +19,8 @@ export function applyScheme({ scene, store }) {
   const colour = (name) => style.getPropertyValue(name).trim();
   for (const [uniform, name] of Object.entries(COLOURS)) scene.uniforms[uniform].value.set(colour(name));
   scene.background.set(colour("--canvas"));
+  scene.inks = { edge: scene.uniforms.ink.value.clone(), wire: scene.background.clone().set(colour("--wire")) };
+  scene.gauss.ink.value = scene.inks.wire;
   const { ballColour, ballRim } = scene.gauss.uniforms;
   ballColour.value = scene.background.clone().set(colour("--ball"));
   ballRim.value = scene.background.clone().set(colour("--ball-rim"));
