@@ -31,11 +31,16 @@ export function showNumbers({ store }) {
     make("span", { className: "broken" }, words)));
 }
 
-// The plot: one more point, or a new one where the mesh is new.
+const PAUSE = 0.6; // seconds that a rest takes in the plot, however long it was
+
+// The plot: one more point, or a new one where the mesh is new. Its clock stands still while nothing moves.
 export function extendPlot(store) {
-  const { numbers } = store;
-  if (numbers.reset) store.plot = [];
-  if (Number.isFinite(numbers.E) && Number.isFinite(numbers.time)) store.plot.push([numbers.time, numbers.E]);
+  const { E, time, reset } = store.numbers;
+  if (reset) store.plot = [];
+  if (!Number.isFinite(E) || !Number.isFinite(time)) return;
+  const step = Math.max(0, Math.min(PAUSE, time - (store.plotTime ?? time)));
+  store.plot.push([(store.plot.at(-1)?.[0] ?? 0) + step, E]);
+  store.plotTime = time;
   if (store.plot.length > 4000) store.plot = store.plot.filter((_, i) => i % 2 === 0);
   drawPlot(byId("plot"), store.plot);
 }
