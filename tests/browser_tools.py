@@ -128,6 +128,13 @@ class Window:
             self.page.wait_for_timeout(20)
         return said
 
+    def open(self, source: str) -> None:
+        """Opens a mesh or session of the folder."""
+        before = self("design.store.frame.number")
+        self(f"design.send('open', {{ source: {source!r} }})")
+        self.wait(f"design.store.frame.number > {before}")
+        self.ready()
+
     def drawn(self) -> None:
         """Until what was changed is in the picture."""
         before = self("(design.scene.invalidate(), design.scene.frames)")
@@ -172,6 +179,10 @@ class Window:
         self.page.mouse.down()
         self.page.mouse.move(x + across, y + down, steps=steps)
         self.wait("design.store.state.state === 'DRAGGING'")
+
+    def end_drag(self) -> None:
+        self.page.mouse.up()
+        self.at_rest()
 
     def picture(self) -> NDArray[np.float64]:
         """(H, W, 3) pixels of the mesh alone, 0 to 255."""

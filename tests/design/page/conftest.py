@@ -1,4 +1,4 @@
-"""Browser, server and mesh of the tests of the page: one of each for a module."""
+"""Server and mesh of all tests of the page, browser and window of a module of them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def browser() -> Iterator[Any]:
         yield browser
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a mesh, ``hall.obj``."""
     folder = tmp_path_factory.mktemp("design")
@@ -31,8 +31,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def served(browser: Any, folder: Path) -> Iterator[Served]:
+@pytest.fixture(scope="session")
+def served(folder: Path) -> Iterator[Served]:
     served = Served(folder, "hall.obj")
     yield served
     served.stop()
@@ -57,6 +57,7 @@ def open_window(browser: Any, served: Served) -> Iterator[Callable[..., Window]]
 @pytest.fixture(scope="module")
 def only_window(browser: Any, served: Served) -> Iterator[Window]:
     window = Window(browser, served.url)
+    window.open("hall.obj")
     yield window
     window.page.context.close()
 

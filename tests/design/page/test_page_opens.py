@@ -12,7 +12,7 @@ from browser_tools import Served, Window
 pytestmark = pytest.mark.browser
 
 OpenWindow = Callable[..., Window]
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_it_draws_the_mesh_and_rests(window: Window) -> None:
