@@ -19,8 +19,7 @@ def hall_window(window: Window) -> Window:
     """The mesh as it was opened, whatever tests before did."""
     if window("design.store.state.undo > 0 || design.store.topology.vertices !== 108"):
         window.open("hall.obj")
-    for details in window.page.locator("#panel details:not([open]) > summary").all():
-        details.click()
+    window("document.querySelectorAll('#panel details').forEach((details) => { details.open = true; })")
     return window
 
 
@@ -56,18 +55,22 @@ def test_undo_and_redo_are_equal_to_the_bit(hall_window: Window) -> None:
 def test_a_slider_of_a_weight_acts_on_the_running_solve(hall_window: Window) -> None:
     window = hall_window
     lift(window)
-    name = window("design.store.settings.weights[0].name")
-    slider, before = window.page.locator(f"[data-weight={name}]"), window.positions()
-    frame = window("design.store.frame.number")
+    slider, before = window.page.locator("[data-weight=fairness]"), window.positions()
+    number = "Number(document.querySelector('[data-weight=fairness]').nextElementSibling.value)"
+    weight, frame = window(number), window("design.store.frame.number")
     slider.focus()
-    for _ in range(3):
+    for _ in range(4):
         window.page.keyboard.press("PageUp")
     window.wait(f"design.store.frame.number > {frame}")
     window.at_rest()
-    window.wait(f"design.store.settings.weights[0].value > design.store.settings.weights[0].default")
-    shown = float(slider.evaluate("(slider) => slider.nextElementSibling.value"))
-    assert shown == pytest.approx(window("design.store.settings.weights[0].value"), rel=0.01)
-    assert np.abs(window.positions() - before).max() > 0
+    assert window(number) > 2 * weight
+    assert np.abs(window.positions() - before).max() > 1e-3
+    while (window.positions() != before).any():  # each step of the slider is an edit
+        steps = window("design.store.state.undo")
+        assert steps > 1
+        window.page.click("[data-action=undo]")
+        window.wait(f"design.store.state.undo < {steps}")
+        window.at_rest()
 
 
 def test_choices_and_modes_are_those_of_the_engine(hall_window: Window) -> None:
@@ -113,7 +116,7 @@ def test_the_surface_becomes_quads(hall_window: Window) -> None:
     window.at_rest()
     sizes = window("[...design.scene.mesh.starts].slice(1).map((end, i) => end - design.scene.mesh.starts[i])")
     assert window.page.locator(".notice.error").count() == 0, window.notices()
-    assert sizes.count(4) > 0.8 * len(sizes)
+    assert sizes.count(4) > 0.6 * len(sizes)  # the rest are along the boundary
     assert 45 < len(sizes) < 180
 
 
@@ -123,7 +126,7 @@ def test_what_is_saved_is_what_is_seen(hall_window: Window, folder: Path) -> Non
     window.page.select_option("#download [name=format]", "obj")
     window.page.fill("#download [name=name]", "lifted.obj")
     window.page.click("#download [value=folder]")
-    window.wait("document.querySelector('.notice.info')")
+    window.wait("document.getElementById('notices').textContent.includes('lifted.obj')")
     mesh = load_mesh(folder / "lifted.obj")
     seen = window.positions() + np.array(window("design.store.topology.origin"))
     assert np.abs(mesh.vertices.numpy() - seen).max() < 1e-4

@@ -12,8 +12,8 @@ const look = ({ name, words }, i) => [`look-${name}`, {
   group: "Look", words, key: String(i + 1), run: ({ store }) => store.put({ look: name }) }];
 
 export const ACTIONS = {
-  undo: { group: "Edit", words: "Undo", key: "Ctrl+Z", needs: "undo", icon: "M9 5 4 10l5 5M4 10h10a6 6 0 0 1 0 12h-3", run: ({ send }) => send("undo") },
-  redo: { group: "Edit", words: "Redo", key: "Ctrl+Shift+Z", also: "Ctrl+Y", needs: "redo", icon: "m15 5 5 5-5 5m5-5H10a6 6 0 0 0 0 12h3", run: ({ send }) => send("redo") },
+  undo: { group: "Edit", words: "Undo", key: "Ctrl+Z", needs: "undo", enabled: ({ store }) => store.state.undo > 0, icon: "M9 5 4 10l5 5M4 10h10a6 6 0 0 1 0 12h-3", run: ({ send }) => send("undo") },
+  redo: { group: "Edit", words: "Redo", key: "Ctrl+Shift+Z", also: "Ctrl+Y", needs: "redo", enabled: ({ store }) => store.state.redo > 0, icon: "m15 5 5 5-5 5m5-5H10a6 6 0 0 0 0 12h3", run: ({ send }) => send("redo") },
   open: { group: "Files", words: "Open", key: "Ctrl+O", needs: "list", icon: "M3 19V5h6l2 3h10v11zM3 11h18", run: ({ files }) => files.dialog() },
   save: { group: "Files", words: "Save the session", key: "Ctrl+S", needs: "save", icon: "M12 4v11m-5-5 5 5 5-5M4 20h16", run: ({ files }) => files.saveSession() },
   screenshot: { group: "Files", words: "Picture at twice the size", key: "Shift+S", icon: "M4 8h4l2-3h4l2 3h4v11H4zm8 2a3.5 3.5 0 1 0 0 7 3.5 3.5 0 0 0 0-7", run: ({ files }) => files.screenshot() },
