@@ -34,7 +34,7 @@ void main() {
   float w = width, value = clamp(least + span * amount, 0.0, 1.0);
   tint = vec4(ink, opacity);
   if (paint == ${LineColour.SCALE}) {
-    tint = vec4(texture(palette, vec2(value, 0.5)).rgb, 1.0);
+    tint = vec4(texture(palette, vec2(value, 0.5)).rgb, mix(0.25, 1.0, smoothstep(0.0, 0.15, value)));
     w *= 0.6 + 1.2 * value;
   }
   if (paint == ${LineColour.MARKED}) {
