@@ -34,8 +34,9 @@ def main() -> None:
         served = Served(Path(folder), "example:hybrid_roof")
         try:
             window = Window(browser, served.url, viewport={"width": 1180, "height": 720})
-            window("(document.getElementById('frequency').value = 5, design.panel.applyMirror())")
+            window("(document.getElementById('frequency').value = 9, design.panel.applyMirror())")
             window("design.flights.arrive({ around: -1.15, up: 0.5 }), design.flights.arrive(design.flights.whole())")
+            window("document.getElementById('notices').hidden = true")
             window.drawn()
             save_gif(list(drag(window)), IMAGES / "design_drag.gif")
             page(window).save(IMAGES / "design_page.png", optimize=True)
@@ -84,9 +85,10 @@ def save_gif(frames: list[Image.Image], path: Path) -> None:
     for width in (860, 760, 660, 560):
         sizes = [(width, round(frame.height * width / frame.width)) for frame in frames]
         small = [frame.resize(size, Image.Resampling.LANCZOS) for frame, size in zip(frames, sizes, strict=True)]
-        palette = small[len(small) // 2].quantize(64)
+        palette = small[-1].quantize(96, method=Image.Quantize.MAXCOVERAGE)
         fixed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small]
-        fixed[0].save(path, save_all=True, append_images=fixed[1:], duration=[600, *[70] * (len(fixed) - 2), 1500], loop=0)
+        times = [600, *[70] * (len(fixed) - 2), 1500]  # ms
+        fixed[0].save(path, save_all=True, append_images=fixed[1:], duration=times, loop=0)
         if path.stat().st_size < MOST:
             return
     raise SystemExit(f"{path} has {path.stat().st_size} bytes: take fewer frames")
@@ -96,13 +98,12 @@ def page(window: Window) -> Image.Image:
     """The whole page with a selected handle."""
     window.page.mouse.move(30, 690)
     window.drawn()
-    return shot(window).quantize(256, dither=Image.Dither.NONE)
+    return shot(window).quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
 
 
 def looks(window: Window) -> Image.Image:
     """Four looks beside each other."""
     window.page.keyboard.press("Escape")
-    window("document.getElementById('notices').hidden = true")
     sheet = Image.new("RGB", (1240, 978), "white")
     for k, look in enumerate(LOOKS):
         window(f"design.store.put({{ look: {look!r} }})")
@@ -113,7 +114,7 @@ def looks(window: Window) -> Image.Image:
         picture = shot(window, {**box, "x": box["x"] + 58, "width": box["width"] - 58})
         size = (616, round(picture.height * 616 / picture.width))
         sheet.paste(picture.resize(size, Image.Resampling.LANCZOS), (k % 2 * 624, k // 2 * 493))
-    return sheet.quantize(256, dither=Image.Dither.NONE)
+    return sheet.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import re
 import shutil
@@ -21,16 +22,17 @@ from numpy.typing import NDArray
 
 from torchfair import Topology
 
-FLAGS = (
-    "--no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader --disable-background-networking "
-    "--disable-component-update --disable-sync --no-first-run"
-).split()
+FLAGS = [
+    "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--no-first-run",
+]  # fmt: skip
 PATIENCE = 60.0  # seconds until a wait is given up
 
 
 def chromium() -> str | None:
     """The browser of the machine; None if there is none."""
-    return next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
+    found = (shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome"))
+    return next((path for path in found if path), None)
 
 
 def hall(columns: int = 12, rows: int = 9) -> tuple[torch.Tensor, Topology]:
@@ -89,12 +91,16 @@ class Window:
         self.page = browser.new_context(**{"viewport": {"width": 900, "height": 640}, **settings}).new_page()
         self.faults: list[str] = []
         self.requests: list[str] = []
-        self.page.on("console", lambda said: self.faults.append(said.text) if said.type in ("error", "warning") else None)
+        self.page.on("console", self._said)
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(url)
         if ready:
             self.ready()
+
+    def _said(self, message: Any) -> None:
+        if message.type in ("error", "warning"):
+            self.faults.append(message.text)
 
     def check(self, served: Served) -> None:
         """Nothing has gone wrong in it, and nothing came from elsewhere."""
@@ -104,11 +110,15 @@ class Window:
     def reset(self) -> None:
         """Everything as in a new window, but for the mesh."""
         self.page.keyboard.press("Escape")
-        self(
-            "(design.store.put({ look: 'mirror', tool: 'pull', lines: true, sphere: true, selection: new Set(), hover: null }),"
-            " document.getElementById('notices').replaceChildren(), design.flights.arrive({ around: -1, up: 0.6 }),"
-            " design.flights.arrive(design.flights.whole()), design.scene.view.orthographic && design.flights.parallel())"
-        )
+        for script in (
+            "design.store.put({ look: 'mirror', tool: 'pull', lines: true, sphere: true, hover: null })",
+            "design.selection.clear()",
+            "document.getElementById('notices').replaceChildren()",
+            "design.flights.arrive({ around: -1, up: 0.6 })",
+            "design.flights.arrive(design.flights.whole())",
+            "design.scene.view.orthographic && design.flights.parallel()",
+        ):
+            self(script)
         self.drawn()
 
     def ready(self) -> None:
@@ -165,12 +175,13 @@ class Window:
 
     def inner_vertex(self) -> int:
         """A vertex that is seen, near the middle of the picture and off the boundary."""
-        return int(self(
-            "[...design.store.boundary.keys()].filter((v) => !design.store.boundary[v]).map((v) => [v, ...design.scene"
-            ".view.project(design.scene.mesh.point(v))]).map(([v, x, y]) => [v, Math.hypot(x - design.scene.view.width / 2,"
-            " y - design.scene.view.height / 2)]).filter(([v]) => design.picker.at(...design.scene.view.project("
-            "design.scene.mesh.point(v)).slice(0, 2)).vertex === v).sort((a, b) => a[1] - b[1])[0][0]"
-        ))  # fmt: skip
+        width, height = self("[design.scene.view.width, design.scene.view.height]")
+        seen = self(
+            "[...design.store.boundary.keys()].filter((v) => !design.store.boundary[v])"
+            ".map((v) => [v, ...design.scene.view.project(design.scene.mesh.point(v))])"
+            ".filter(([v, x, y]) => design.picker.at(x, y).vertex === v)"
+        )
+        return int(min(seen, key=lambda row: math.hypot(row[1] - width / 2, row[2] - height / 2))[0])
 
     def begin_drag(self, vertex: int, across: float, down: float, steps: int = 6) -> None:
         """Presses the mouse on a vertex and moves it by some pixels; it stays pressed."""

@@ -120,9 +120,10 @@ def test_surroundings_stay_in_the_room_follow_the_eye_or_stay_on_the_facets(bare
     assert torch.allclose(torch.tensor(eye).double() + torch.tensor(bare("design.store.topology.origin")).double(),
                           camera.origins[0], atol=1e-3)  # fmt: skip
     set_mirror(bare, eye="eye")
-    right, forward, up = (torch.tensor(bare(f"design.scene.view.{axis}")).double() for axis in ("right", "forward", "upward"))
-    x, y, z = torch.tensor(bare("design.scene.uniforms.stripeDirection.value.toArray()")).double()
-    turned = Stripes(x * right + y * forward + z * up, *bare("[design.scene.uniforms.frequency.value, design.scene.uniforms.sharpness.value]"))
+    axes = torch.tensor(bare("[design.scene.view.right, design.scene.view.forward, design.scene.view.upward]"))
+    direction = torch.tensor(bare("design.scene.uniforms.stripeDirection.value.toArray()"))
+    frequency = bare("design.scene.uniforms.frequency.value")
+    turned = Stripes((direction @ axes).double(), frequency, stripes.sharpness)
     assert np.median(differences(bare, turned, *two_colours(bare))) < 0.01
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -110,14 +111,15 @@ def test_the_list_of_keys_is_that_of_the_documentation(window: Window) -> None:
     rows = window.page.locator("#keys tr")
     shown = {(row.locator("th").inner_text(), row.locator("td").inner_text()) for row in rows.all()}
     text = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
-    lines = [line.strip().strip("|").split("|") for line in text.splitlines() if line.startswith("| `")]
-    assert {(key.strip().strip("`"), words.strip()) for key, words in lines} == shown
+    lines = [re.split(r"(?<!\\)\|", line)[1:3] for line in text.splitlines() if line.startswith("| `")]
+    assert {(key.strip().strip("`"), words.strip().replace("\\|", "|")) for key, words in lines} == shown
     window.page.keyboard.press("Escape")
 
 
 def test_it_fits_a_phone(open_window: OpenWindow) -> None:
     window = open_window(viewport={"width": 390, "height": 780}, has_touch=True, is_mobile=True)
-    assert window("document.documentElement.scrollWidth <= innerWidth && document.documentElement.scrollHeight <= innerHeight")
+    root = "document.documentElement"
+    assert window(f"{root}.scrollWidth <= innerWidth && {root}.scrollHeight <= innerHeight")
     assert window("design.scene.canvas.clientHeight > innerHeight / 2")  # the panel is away at first
     window.page.tap("[data-action=panel]")
     window.wait("document.getElementById('panel').offsetHeight > 100")
@@ -136,3 +138,28 @@ def test_colours_follow_the_system_and_the_button(open_window: OpenWindow) -> No
     window.wait("document.documentElement.dataset.scheme === 'light'")
     window.drawn()
     assert window.picture()[2, -2].min() > 200
+
+
+def test_two_fingers_pinch_and_a_long_press_opens_the_menu(open_window: OpenWindow) -> None:
+    window = open_window(viewport={"width": 600, "height": 700}, has_touch=True, is_mobile=True)
+    fingers = window.page.context.new_cdp_session(window.page)
+    box = window.page.locator("#canvas").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + 60
+
+    def touch(kind: str, *places: tuple[float, float]) -> None:
+        points = [{"x": px, "y": py, "id": k} for k, (px, py) in enumerate(places)]
+        fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    start = window("[design.scene.view.distance, design.scene.view.around]")
+    touch("touchStart", (x - 40, y), (x + 40, y))
+    touch("touchMove", (x - 80, y), (x + 80, y))
+    touch("touchEnd")
+    window.wait(f"design.scene.view.distance < 0.7 * {start[0]}")
+    assert window("design.scene.view.around") == start[1]
+    assert window("design.handles.pull === null && design.store.handles.size === 0")
+
+    vertex = window.inner_vertex()
+    touch("touchStart", window.place(vertex))
+    window.wait("!document.getElementById('menu').hidden")
+    touch("touchEnd")
+    assert window.page.inner_text("#menu b") == f"Vertex {vertex}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from browser_tools import Window
@@ -19,7 +21,9 @@ def test_a_hovered_vertex_is_marked_with_its_number_and_its_pyramid(window: Wind
     window.page.mouse.move(*window.place(vertex))
     window.wait(f"design.store.hover === {vertex}")
     assert window.page.inner_text("#tag") == f"vertex {vertex}"
-    marks = window("design.scene.gauss.lines.object.geometry.getAttribute('mark').array.reduce((sum, m) => sum + (m > 0), 0)")
+    marks = window(
+        "design.scene.gauss.lines.object.geometry.getAttribute('mark').array.filter((mark) => mark > 0).length"
+    )
     assert marks == window(f"design.scene.mesh.starEdges({vertex}).length")
     window.page.mouse.move(*window.place(vertex)[:1], 60)
     window.wait("design.store.hover === null")
@@ -40,7 +44,7 @@ def test_a_drag_moves_the_handle_and_settles_where_it_was_put(window: Window) ->
     assert window(f"design.store.handles.has({vertex})")
     plot = window("design.store.plot")
     assert len(plot) > 3
-    assert all(a[0] <= b[0] for a, b in zip(plot, plot[1:], strict=False))
+    assert all(a[0] <= b[0] for a, b in pairwise(plot))
     shift = gone(window, vertex, start)  # in the plane of the picture
     assert abs(shift @ np.array(window("design.scene.view.forward"))) < 0.05 * np.linalg.norm(shift)
     window.do("design.send('undo')")
@@ -87,8 +91,9 @@ def test_an_arrow_pulls_several_vertices_together(window: Window) -> None:
     assert window("design.store.selection.size") == 2
     window.drawn()
     tip = window(
-        "(() => { const m = design.handles.middle(), k = design.gizmo.unit(m); m[2] += 50 * k; const p ="
-        " design.scene.view.project(m), b = design.scene.canvas.getBoundingClientRect(); return [b.left + p[0], b.top + p[1]]; })()"
+        "(() => { const m = design.handles.middle(); m[2] += 50 * design.gizmo.unit(m);"
+        " const p = design.scene.view.project(m), b = design.scene.canvas.getBoundingClientRect();"
+        " return [b.left + p[0], b.top + p[1]]; })()"
     )
     window.page.mouse.move(*tip)
     window.wait("design.scene.canvas.dataset.over === 'axis'")

@@ -27,7 +27,9 @@ def test_three_is_unchanged_and_has_its_licence() -> None:
 def test_addresses_are_relative(path: Path) -> None:
     text = path.read_text(encoding="utf-8").replace("http://www.w3.org/", "")
     assert not re.search(r"""https?://|["'(]/[a-z]|@import""", text)
-    assert not re.search(r"""\bstyle=|\son[a-z]+=["']|<script>|\beval\(|new Function""", text)  # the policy forbids them
+    assert not re.search(
+        r"""\bstyle=|\son[a-z]+=["']|<script>|\beval\(|new Function""", text
+    )  # forbidden by the policy
 
 
 @pytest.mark.parametrize("path", [path for path in OWN if path.suffix == ".js"], ids=lambda path: path.name)

@@ -1,5 +1,6 @@
 // Puts the page together: what comes from the engine goes into the store and the scene, what people do goes to it.
 
+import { Corner } from "./corner.js";
 import { Files } from "./files.js";
 import { Flights } from "./flights.js";
 import { byId, make, many } from "./format.js";
@@ -14,7 +15,7 @@ import { Notices, stateBanner } from "./notices.js";
 import { buildNumbers, showNumbers, showWorst } from "./numbers.js";
 import { Panel } from "./panel.js";
 import { Picker } from "./pick.js";
-import { Corner, Pointer } from "./pointer.js";
+import { Pointer } from "./pointer.js";
 import { Receiver } from "./receive.js";
 import { Scene } from "./scene.js";
 import { Selection } from "./selection.js";

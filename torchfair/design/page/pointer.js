@@ -1,7 +1,5 @@
 // Mouse, pen and fingers on the picture: what a press, a drag, a pinch or the wheel means there.
 
-import { byId } from "./format.js";
-
 const STILL = 4;       // pixels that a press may move and still be a click
 const LONG = 500;      // ms until a still finger opens the menu
 const FINGER = 26;     // reach of a finger, in pixels
@@ -48,7 +46,7 @@ export class Pointer {
   chooseAct(event, x, y, found) {
     const { app } = this, { tool } = app.store;
     if (event.button === 1 || event.button === 2) return this.panning();
-    if (app.corner.contains(x, y)) return { move: () => {}, end: () => {} };
+    if (app.corner.contains(x, y)) return this.orbiting();
     if (tool !== "pull") return this.choosing(event);
     const axis = app.gizmo.at(x, y);
     if (axis !== null && app.can("move")) {
@@ -80,13 +78,15 @@ export class Pointer {
 
   pulling(vertices, grip, axis, across) {
     const { handles, selection, store } = this.app, { x, y } = this.start;
+    let begun = false;
     const begin = () => {
+      begun = true;
       if (!vertices.every((v) => store.selection.has(v))) selection.set(vertices);
       handles.begin(vertices, grip, x, y, axis, across);
     };
     const move = (px, py) => {
-      if (!handles.pull) begin();
-      handles.move(px, py);
+      if (!begun) begin();
+      if (handles.pull) handles.move(px, py); // Esc may have ended it
     };
     return { move, end: () => handles.end(), cancel: () => handles.cancel() };
   }
@@ -123,12 +123,15 @@ export class Pointer {
 
   lift(event) {
     clearTimeout(this.long);
-    if (!this.down.delete(event.pointerId)) return;
+    if (!this.down.has(event.pointerId)) return;
+    this.moved(event); // the last move may not have been told
+    this.down.delete(event.pointerId);
     const { act, start } = this;
     if (this.down.size > 0) return;
     this.act = null;
     if (start.moved) act?.end();
     else this.click(event, start.found, act);
+    if (event.pointerType !== "touch") this.hover(...this.at(event));
   }
 
   cancelled(event) {
@@ -184,29 +187,5 @@ export class Pointer {
       this.canvas.dataset.over = axis !== null ? "axis" : found.vertex !== null ? "vertex" : "";
     } while (this.wanted !== shown);
     this.looking = false;
-  }
-}
-
-// The corner of the Gauss image.
-export class Corner {
-  constructor({ scene, flights }) {
-    Object.assign(this, { scene, flights, element: byId("gauss") });
-  }
-
-  place(x, y) {
-    const { gauss, view } = this.scene, [left, low] = gauss.corner;
-    return [x - left, y - (view.height - low - gauss.size)];
-  }
-
-  contains(x, y) {
-    const { gauss, mesh } = this.scene, [dx, dy] = this.place(x, y), r = gauss.size / 2;
-    return Boolean(mesh) && gauss.visible && Math.hypot(dx - r, dy - r) < r;
-  }
-
-  faceAt(x, y) { return this.scene.gauss.faceAt(...this.place(x, y), this.scene.view); }
-
-  click(x, y) {
-    const face = this.faceAt(x, y);
-    if (face !== null) this.flights.toPlace(this.scene.mesh.faceCentre(face), 8 * this.scene.mesh.meanEdge());
   }
 }
