@@ -86,7 +86,7 @@ export class Panel {
       value: option.value, selected: option.value === value }, option.words));
     const select = make("select", { data: { choice: name } }, ...options);
     select.addEventListener("change", () => this.app.send("choose", { choices: { [name]: select.value } }));
-    return make("label", { className: "row" }, make("span", {}, words), select);
+    return make("label", { className: "row", title: words }, make("span", {}, words), select);
   }
 
   weightRow(weight) {
@@ -102,7 +102,7 @@ export class Panel {
     slider.addEventListener("input", () => send(false));
     slider.addEventListener("change", () => send(true));
     slider.addEventListener("dblclick", () => { slider.value = toSlider(weight, weight.default); send(true); });
-    return make("label", { className: "row" }, make("span", {}, words), slider, output);
+    return make("label", { className: "row", title: words }, make("span", {}, words), slider, output);
   }
 
   updateWeights(weights) {
