@@ -139,10 +139,13 @@ class Window:
         return said
 
     def open(self, source: str) -> None:
-        """Opens a mesh or session of the folder."""
-        before = self("design.store.frame.number")
+        """Opens a mesh or session of the folder as it is there, without edits of before that were not saved."""
+        before, asking = self("design.store.frame.number"), "document.getElementById('asking').open"
         self(f"design.send('open', {{ source: {source!r} }})")
-        self.wait(f"design.store.frame.number > {before}")
+        self.wait(f"design.store.frame.number > {before} || {asking}")
+        if self(asking):
+            self.page.click("#asking button[value=file]")
+            self.wait(f"design.store.frame.number > {before}")
         self.ready()
 
     def drawn(self) -> None:
