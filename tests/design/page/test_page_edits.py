@@ -192,15 +192,3 @@ def test_worst_edges_are_flown_to(hall_window: Window) -> None:
     a, b = (np.array(window(f"design.scene.mesh.point({vertex})")) for vertex in worst[0]["vertices"])
     target = ((a + b) / 2).tolist()
     window.wait(f"Math.hypot(...design.scene.view.target.map((x, i) => x - {target}[i])) < 1e-3")
-
-
-def test_a_question_changes_nothing_when_it_is_closed(hall_window: Window) -> None:
-    lift(hall_window)
-    shape = hall_window.positions()
-    hall_window.wait("design.can('open')")
-    hall_window("design.send('open', { source: 'hall.obj' })")
-    hall_window.wait("document.getElementById('asking').open")
-    assert "not saved" in hall_window.page.inner_text("#asking p")
-    hall_window.page.keyboard.press("Escape")
-    hall_window.ready()
-    assert (hall_window.positions() == shape).all()
