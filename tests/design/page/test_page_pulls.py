@@ -20,7 +20,7 @@ def test_a_hovered_vertex_is_marked_with_its_number_and_its_pyramid(window: Wind
     vertex = window.inner_vertex()
     window.page.mouse.move(*window.place(vertex))
     window.wait(f"design.store.hover === {vertex}")
-    assert window.page.inner_text("#tag") == f"vertex {vertex}"
+    assert window.page.inner_text("#tag") == f"vertex {vertex} ({vertex + 1} in the file)"  # OBJ counts from 1
     marks = window(
         "design.scene.gauss.lines.object.geometry.getAttribute('mark').array.filter((mark) => mark > 0).length"
     )
