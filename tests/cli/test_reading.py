@@ -29,7 +29,7 @@ def test_every_command_that_reads_a_mesh_can_weld_it(command: str) -> None:
     for words, expected in ((["--weld"], True), (["--weld", "0.5"], 0.5), (["--weld=2"], 2.0), ([], False)):
         arguments = build_parser().parse_args([command, *words, "in.obj", *output])
         assert arguments.weld == expected
-        assert arguments.input == "in.obj"
+        assert arguments.input == ["in.obj"]
         assert not arguments.split_edges
 
 
@@ -181,10 +181,12 @@ def test_numbers_beyond_the_file_are_refused_though_repair_adds_vertices(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "bow.obj"
-    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv -1 0 0\nv -1 -1 0\nf 1 2 3\nf 1 4 5\n")
+    places = ("0 0 0", "1 0 0", "1 1 0", "0 1 0.1", "-1 0 0", "-1 -1 0", "0 -1 0.1")
+    fans = ("1 2 3", "1 3 4", "1 5 6", "1 6 7")
+    path.write_text("\n".join([*(f"v {place}" for place in places), *(f"f {face}" for face in fans)]) + "\n")
     words = ["fair", str(path), "-o", str(tmp_path / "o.obj"), "--repair", "--no-pictures"]
-    assert main([*words, "--fix", "6"]) == 2
-    assert "vertices are numbered 1 to 5 in the file, got 6" in capsys.readouterr().err
+    assert main([*words, "--fix", "8"]) == 2
+    assert "vertices are numbered 1 to 7 in the file, got 8" in capsys.readouterr().err
 
 
 def test_what_meshing_has_read_is_in_its_report(tmp_path: Path) -> None:
