@@ -73,6 +73,7 @@ def test_mesh_report_and_pictures_are_written(tmp_path: Path, capsys: pytest.Cap
     assert "C " in err
 
 
+@pytest.mark.slow
 def test_normals_in_a_curve_file_prescribe_tangent_planes(tmp_path: Path) -> None:
     words = []
     for name, height in (("bottom", 0.0), ("top", 1.0)):
@@ -145,6 +146,7 @@ def test_curves_alone_are_tried_from_several_starts(circle: str, tmp_path: Path)
     assert not any("starts" in note for note in notes_of(tmp_path / "mesh"))
 
 
+@pytest.mark.slow
 def test_points_on_the_rim_and_far_away_are_said(
     circle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
