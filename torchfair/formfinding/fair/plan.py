@@ -49,8 +49,8 @@ class FairPlan(Plan):
     def stages(self) -> Stages:
         """All portions; where that leaves faces warped or has to raise E, faces are made planar first, E lowered then.
 
-        Of both the better one is kept. Where none has planar faces, the start is, with E lowered as far as no face is
-        warped more than the worst one was.
+        Where neither helps, they are made planar from where the planes of faces meet. The best is kept. Where none has
+        planar faces, the start is, with E lowered as far as no face is warped more than the worst one was.
         """
         problem, start = self._problem, self.state["vertices"]
         every = problem.settings.projection.takes_every_step
@@ -64,6 +64,10 @@ class FairPlan(Plan):
             return
         yield from self._made_planar(start)
         found = [first, self.state["vertices"]]
+        meeting = problem.where_planes_meet(start)
+        if meeting is not None and all(problem.largest_warp(vertices) > PLANAR_PROMISE for vertices in found):
+            yield from self._made_planar(meeting)
+            found.append(self.state["vertices"])
         planar = [vertices for vertices in found if problem.largest_warp(vertices) <= PLANAR_PROMISE]
         if planar:
             best = min(planar, key=problem.energy)

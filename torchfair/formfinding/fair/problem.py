@@ -19,6 +19,7 @@ from ..job.plan import Stage
 from ..job.pulls import Pulls
 from ..references import GivenReference
 from .face_bounds import FaceBounds
+from .face_planes import on_face_planes
 from .feature_curves import FeatureCurves
 from .free_boundary import FreeBoundary
 from .gliding_boundary import GlidingBoundary
@@ -199,6 +200,19 @@ class FairProblem:
         """Largest relative planarity of the faces kept planar, with gliding ``vertices`` (V, 3) put in place."""
         warped = self.panels.warps(self.placed({"vertices": vertices}))
         return float(warped.max()) if warped.numel() else 0.0
+
+    def where_planes_meet(self, vertices: Tensor) -> Tensor | None:
+        """A start (V, 3) nearer to planar faces, far off within the tangent planes; None if it breaks bounds."""
+        stay = self.stays() | self.pulls.pulled | self.pulls.held
+        moved = torch.where(stay[:, None], vertices, on_face_planes(vertices, self.topology, self.panels.planar))
+        state, trial = {"vertices": vertices}, {"vertices": moved}
+        if torch.equal(moved, vertices) or not (
+            self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
+        ):
+            return None
+        if not self.settings.planar_distance and self.near.limits is not None:
+            return None if bool((self.near.distances(self.placed(trial)) > self.near.limits).any()) else moved
+        return moved
 
     def energy(self, vertices: Tensor) -> float:
         """E, with gliding ``vertices`` (V, 3) put in place."""
