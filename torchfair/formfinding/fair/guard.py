@@ -14,6 +14,8 @@ from ...projection.layout import State
 from ...topology import Topology
 from .short_sides import ShortSides
 
+_UPRIGHT = 1e-9  # cosine of a face with itself at the start: on the edge, rounding decides what is measured
+
 
 class FairGuard:
     """Judges the mesh of a state, with gliding vertices on their curves, where barriers see them beside.
@@ -56,7 +58,7 @@ class FairGuard:
     def keeps_faces(self, state: State, trial: State) -> bool:
         """Whether no face turns over."""
         start, after = self._start.area_vectors, self._mesh(trial).area_vectors
-        upright = dot(start, after) > 0.0
+        upright = dot(start, after) > _UPRIGHT * norm(start) * norm(after)
         if not self._from_last:
             return bool(upright.all())
         before = self._mesh(state).area_vectors
