@@ -144,4 +144,7 @@ def test_jobs_go_on_where_triangles_became_thin() -> None:
         assert not minimise_absolute_curvature(*start, curves=curves).holds
         result = minimise_absolute_curvature(*start, curves=curves, remesh=True, levels=1)
         assert all(promise.holds for promise in result.levels[0].promises)
-        assert result.topology.num_faces == 4 * result.levels[0].topology.num_faces
+        if any(note.startswith("level 1: ") and note.endswith(": replaced") for note in result.notes):
+            assert result.holds
+        else:
+            assert result.topology.num_faces == 4 * result.levels[0].topology.num_faces
