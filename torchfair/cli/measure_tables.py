@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from .._names import FROM_ZERO, Names
 
@@ -71,37 +71,39 @@ def format_quantities(quantities: list[Quantity]) -> str:
 
 def format_edges(edges: Sequence[EdgeMeasures], names: Names = FROM_ZERO) -> str:
     """The edges as a table."""
-    lines = [
-        "",
+    title = (
         f"worst edges (vertices as in the file, from {names.first}; l and l |a| in length units of the file, a in "
-        "degrees, positive where convex)",
-        f"  {'vertices':>19} {'l':>12} {'a':>12} {'l |a|':>12}  middle x y z",
-    ]
-    for edge in edges:
-        ends = " - ".join(map(names.vertex, edge.vertices))
-        numbers = (edge.length, edge.dihedral_angle_degrees, edge.angle_variation)
-        cells = " ".join(f"{_number(x):>12}" for x in numbers)
-        lines.append(f"  {ends:>19} {cells}  {_place(edge.position)}")
-    return "\n".join(lines)
+        "degrees, positive where convex)"
+    )
+    rows = (
+        (" - ".join(map(names.vertex, edge.vertices)),
+         (edge.length, edge.dihedral_angle_degrees, edge.angle_variation), edge.position)
+        for edge in edges
+    )  # fmt: skip
+    return _table(title, ("vertices", "l", "a", "l |a|", "middle"), rows)
 
 
 def format_panels(panels: Sequence[PanelMeasures], names: Names = FROM_ZERO) -> str:
     """The panels as a table."""
-    lines = [
-        "",
+    title = (
         f"worst panels (numbers as in the file, from {names.first}; planarity is diagonal distance / mean edge; "
-        "largest kink to a neighbour in degrees)",
-        f"  {'panel':>19} {'planarity':>12} {'area':>12} {'kink':>12}  centre x y z",
-    ]
-    for panel in panels:
-        numbers = (panel.planarity, panel.area, panel.largest_kink_degrees)
+        "largest kink to a neighbour in degrees)"
+    )
+    rows = (
+        (names.face(panel.face), (panel.planarity, panel.area, panel.largest_kink_degrees), panel.position)
+        for panel in panels
+    )
+    return _table(title, ("panel", "planarity", "area", "kink", "centre"), rows)
+
+
+def _table(title: str, columns: Sequence[str], rows: Iterable[tuple[str, Iterable[Any], Iterable[float]]]) -> str:
+    """Name, three numbers and a place in every row."""
+    name, *heads, place = columns
+    lines = ["", title, f"  {name:>19} {' '.join(f'{head:>12}' for head in heads)}  {place} x y z"]
+    for named, numbers, position in rows:
         cells = " ".join(f"{_number(x):>12}" for x in numbers)
-        lines.append(f"  {names.face(panel.face):>19} {cells}  {_place(panel.position)}")
+        lines.append(f"  {named:>19} {cells}  {' '.join(map(_number, position))}")
     return "\n".join(lines)
-
-
-def _place(position: Sequence[float]) -> str:
-    return " ".join(map(_number, position))
 
 
 def _label(quantity: Quantity) -> str:

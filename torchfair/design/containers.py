@@ -83,8 +83,3 @@ def frame(
     """
     head = _HEADER.pack(FRAME, flags, count, number, topology, len(positions), len(edges), scale)
     return head + positions.astype("<f4").tobytes() + edges.astype("<u1").tobytes()
-
-
-def frame_number(data: bytes) -> int:
-    """The number in the header of a frame."""
-    return int(_HEADER.unpack_from(data)[3])

@@ -51,11 +51,6 @@ class Element:
     count: int
     properties: list[Property] = field(default_factory=list)
 
-    @property
-    def has_lists(self) -> bool:
-        """Whether rows may differ in length."""
-        return any(p.count_type for p in self.properties)
-
     def find(self, *names: str) -> int | None:
         """Position of the first property with one of ``names``."""
         return next((i for i, p in enumerate(self.properties) if p.name in names), None)

@@ -12,13 +12,14 @@ from .. import geometry
 from .._one_mesh import one_mesh
 from ..energies import angle_variation_per_edge
 from ..errors import ShapeError
+from ..settings.fair_settings import FairSettings
 from ..topology import Topology
 
-PLANAR = 1e-3
-"""Planarity below which a panel is called planar."""
-NEARLY_PLANAR = 5e-3
-"""Planarity below which a panel is called nearly planar."""
-_CREASE = math.radians(40.0)  # as by default in fair
+PLANAR = FairSettings.planar_tolerance
+"""Planarity below which a panel is called planar: what the job that lowers E keeps planar by default."""
+NEARLY_PLANAR = FairSettings.planar_reach
+"""Planarity below which a panel is called nearly planar: what that job does not make less planar."""
+_CREASE = FairSettings.crease_angle
 _FLAT = math.radians(0.01)
 
 
@@ -145,10 +146,7 @@ def worst_edges(vertices: Tensor, topology: Topology, count: int) -> list[EdgeMe
         ShapeError: if ``vertices`` are not one mesh that fits the topology, or ``count`` is negative.
     """
     vertices = one_mesh(vertices, topology)
-    if count < 0:
-        raise ShapeError("count", "0 or more", count)
-    values = angle_variation_per_edge(vertices, topology)
-    return edge_measures(vertices, topology, values.argsort(descending=True, stable=True)[:count])
+    return edge_measures(vertices, topology, _largest(angle_variation_per_edge(vertices, topology), count))
 
 
 def worst_panels(vertices: Tensor, topology: Topology, count: int) -> list[PanelMeasures]:
@@ -163,11 +161,16 @@ def worst_panels(vertices: Tensor, topology: Topology, count: int) -> list[Panel
         ShapeError: if ``vertices`` are not one mesh that fits the topology, or ``count`` is negative.
     """
     vertices = one_mesh(vertices, topology)
+    warps = geometry.planarity(vertices, topology)
+    order = _largest(warps, count)
+    return panel_measures(vertices, topology, order[warps[order] >= PLANAR])
+
+
+def _largest(values: Tensor, count: int) -> Tensor:
+    """Numbers of the ``count`` largest values, the largest first, equal ones by their numbers."""
     if count < 0:
         raise ShapeError("count", "0 or more", count)
-    warps = geometry.planarity(vertices, topology)
-    order = warps.argsort(descending=True, stable=True)[:count]
-    return panel_measures(vertices, topology, order[warps[order] >= PLANAR])
+    return values.argsort(descending=True, stable=True)[:count]
 
 
 def _largest_kinks(vertices: Tensor, topology: Topology) -> Tensor:

@@ -62,11 +62,6 @@ class Layout:
         """Length of the flat vector."""
         return sum(n * d for n, d in self.sizes.values())
 
-    @property
-    def num_nodes(self) -> int:
-        """Number of rows of all blocks."""
-        return sum(n for n, _ in self.sizes.values())
-
     def offset(self, name: str) -> int:
         """Position of the first unknown of a block."""
         return sum(n * d for n, d in self._sizes_before(name))

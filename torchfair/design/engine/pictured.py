@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import torch
 
 from ...creases import crease_edges
 from ...geometry import edge_lengths
+from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..containers import pack
 from ..document import Document
 
 PRINCIPAL, BOUNDARY, CREASE = 1, 2, 4
 """Bits of the labels of edges."""
-_CREASE_ANGLE = math.radians(40.0)
 
 
 def topology_message(document: Document, topology: Topology, number: int) -> bytes:
@@ -74,5 +72,5 @@ def _labels(document: Document, start: torch.Tensor, topology: Topology) -> np.n
     if document.principal is not None:
         labels[document.principal] |= PRINCIPAL
     labels[topology.num_interior_edges :] |= BOUNDARY
-    labels[crease_edges(start, topology, _CREASE_ANGLE).numpy()] |= CREASE
+    labels[crease_edges(start, topology, FairSettings.crease_angle).numpy()] |= CREASE
     return labels

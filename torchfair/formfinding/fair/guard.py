@@ -52,13 +52,14 @@ class FairGuard:
         self._largest_areas, self._may_turn = largest_areas, may_turn
         self._sides, self._smallest_edge = sides, smallest_edge
         self._start = _Mesh(vertices, topology)
-        self._smallest_areas = smallest_area * norm(self._start.area_vectors)
+        areas = norm(self._start.area_vectors)
+        self._smallest_areas, self._upright = smallest_area * areas, _UPRIGHT * areas
         self._known: list[tuple[Tensor, _Mesh]] = []
 
     def keeps_faces(self, state: State, trial: State) -> bool:
         """Whether no face turns over."""
         start, after = self._start.area_vectors, self._mesh(trial).area_vectors
-        upright = dot(start, after) > _UPRIGHT * norm(start) * norm(after)
+        upright = dot(start, after) > self._upright * norm(after)
         if not self._from_last:
             return bool(upright.all())
         before = self._mesh(state).area_vectors

@@ -64,11 +64,12 @@ class FairPlan(Plan):
             return
         yield from self._made_planar(start)
         found = [first, self.state["vertices"]]
-        meeting = problem.where_planes_meet(start)
-        if meeting is not None and all(problem.largest_warp(vertices) > PLANAR_PROMISE for vertices in found):
+        planar = [vertices for vertices in found if problem.largest_warp(vertices) <= PLANAR_PROMISE]
+        meeting = None if planar else problem.where_planes_meet(start)
+        if meeting is not None:
             yield from self._made_planar(meeting)
             found.append(self.state["vertices"])
-        planar = [vertices for vertices in found if problem.largest_warp(vertices) <= PLANAR_PROMISE]
+            planar = [found[-1]] if problem.largest_warp(found[-1]) <= PLANAR_PROMISE else []
         if planar:
             best = min(planar, key=problem.energy)
         else:

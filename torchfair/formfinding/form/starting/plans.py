@@ -38,12 +38,6 @@ def plan_axes(direction: Floats) -> Floats:
     return np.stack([first, np.cross(direction, first)])
 
 
-def signed_area(plan: Floats) -> float:
-    """Of a closed polygon (n, 2), positive if counterclockwise."""
-    x, y = plan.T
-    return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-
-
 def crossing_pairs(plan: Floats, edges: Ints) -> Ints:
     """(n, 2) edges (E, 2) between points (P, 2) that touch or cross each other without a common end."""
     p, q = plan[edges[:, 0]], plan[edges[:, 1]]
