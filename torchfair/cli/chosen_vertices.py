@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from .._names import first_few
+from .distances import from_segments, two_nearest
 from .errors import CommandError
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ PLACES = {"--handle": 4, "--fix": 1, "--seed": 1, "--on": 1, "--vertex": 1}
 """Options that take numbers and these words, as many as there are, and how many there are at least."""
 
 NUMBERS = "numbers as in the file: from 1 in OBJ files, from 0 in others and in example:NAME"
-_CLEAR = 0.8  # of the distance of the second nearest, within which the nearest one is meant
 _SHOWN = 3
 
 
@@ -117,8 +117,8 @@ class ChosenVertices:
         vertices, used = self.mesh.vertices.double(), self.mesh.topology.valences > 0
         away = torch.linalg.vector_norm(vertices - torch.tensor(place, dtype=torch.float64), dim=1)
         away = torch.where(used, away, math.inf)
-        distances, order = away.topk(min(2, len(away)), largest=False)
-        vertex, distance = int(order[0]), float(distances[0])
+        order, distances, is_clear = two_nearest(away)
+        vertex, distance = order[0], distances[0]
         words = f"{option} near {_text(place)}"
         reach = self._reach(vertex)
         if distance > reach:
@@ -126,11 +126,11 @@ class ChosenVertices:
                 f"{words}: no vertex is there; the nearest one, {self._told(vertex)}, is {distance:.4g} away, more "
                 f"than its edges ({reach:.4g}). Is the place in the unit of the file?"
             )
-        if len(order) > 1 and distance >= _CLEAR * float(distances[1]):
+        if not is_clear:
             raise CommandError(
                 f"{words}: which vertex is meant is not clear: {self._told(vertex)} is {distance:.4g} away, "
-                f"{self._told(int(order[1]))} {float(distances[1]):.4g}. Give a place nearer to one, or its number"
-                f"{', or weld them by --weld' if float(distances[1]) == 0.0 else ''}"
+                f"{self._told(order[1])} {distances[1]:.4g}. Give a place nearer to one, or its number"
+                f"{', or weld them by --weld' if distances[1] == 0.0 else ''}"
             )
         self.notes.append(f"{words}: {self._told(vertex)}, {distance:.4g} away")
         return vertex
@@ -152,20 +152,16 @@ class ChosenVertices:
         """The edge that is nearest to a place, if it is clear which one is meant."""
         import torch
 
-        topology, point = self.mesh.topology, torch.tensor(place, dtype=torch.float64)
-        start, stop = self.mesh.vertices.double()[topology.edges].unbind(1)
-        way = stop - start
-        share = ((point - start) * way).sum(1) / (way * way).sum(1).clamp_min(torch.finfo(torch.float64).tiny)
-        away = torch.linalg.vector_norm(start + share.clamp(0, 1)[:, None] * way - point, dim=1)
-        distances, order = away.topk(min(2, len(away)), largest=False)
-        edge, words = int(order[0]), f"{option} near {_text(place)}"
-        length = float(torch.linalg.vector_norm(way[edge]))
-        if float(distances[0]) > length:
-            raise CommandError(f"{words}: no edge is there; the nearest is {float(distances[0]):.4g} away")
-        if len(order) > 1 and float(distances[0]) >= _CLEAR * float(distances[1]):
-            pairs = " and ".join(self.edge_name(int(number)) for number in order)
+        edges = self.mesh.vertices.double()[self.mesh.topology.edges]
+        away = from_segments(torch.tensor(place, dtype=torch.float64), edges)
+        order, (distance, *_), is_clear = two_nearest(away)
+        edge, words = order[0], f"{option} near {_text(place)}"
+        if distance > float((edges[edge, 1] - edges[edge, 0]).norm()):
+            raise CommandError(f"{words}: no edge is there; the nearest is {distance:.4g} away")
+        if not is_clear:
+            pairs = " and ".join(map(self.edge_name, order))
             raise CommandError(f"{words}: which edge is meant is not clear, {pairs} are as near: aim at its middle")
-        self.notes.append(f"{words}: the edge {self.edge_name(edge)}, {float(distances[0]):.4g} away")
+        self.notes.append(f"{words}: the edge {self.edge_name(edge)}, {distance:.4g} away")
         return edge
 
     # ---- in words --------------------------------------------------------------------------------------

@@ -23,20 +23,13 @@ from .inputs import (
     read_reference,
 )
 from .job_command import JobCommand
-from .pictures import draw_before_after
+from .pictures import draw_before_after, edges_of
 from .request import Request, Writer
 from .several import add_inputs
 
 if TYPE_CHECKING:
     from ..formfinding import JobResult, Level
     from ..io import PolygonMesh
-
-
-def _edges(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
-    from ..viewing import picture_edges
-
-    meshes = {"before": request.mesh.vertices, "after": result.vertices}
-    picture_edges(path, meshes, [request.mesh.topology, result.topology], view=request.view, overwrite=overwrite)
 
 
 def _gauss_images(path: Path, request: Request, result: JobResult[Level], overwrite: bool) -> None:
@@ -61,7 +54,7 @@ class FairCommand(JobCommand):
     option_names: ClassVar[Mapping[str, str]] = {"distance_limit": "distance"}
     pictures: ClassVar[Mapping[str, Writer]] = {
         "before_after.png": draw_before_after,
-        "edges.png": _edges,
+        "edges.png": edges_of("before", "after"),
         "gauss_images.png": _gauss_images,
     }
 

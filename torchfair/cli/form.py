@@ -13,7 +13,7 @@ from .form_inputs import read_form_input
 from .form_mesh import FormOutputs, add_mesh
 from .inputs import add_handles, add_levels, add_repair, read_handles
 from .job_command import JobCommand
-from .pictures import draw_edges
+from .pictures import edges_of
 from .request import Request, Writer
 from .several import add_inputs
 
@@ -43,7 +43,7 @@ class FormCommand(JobCommand):
         "the smoothest that a polyhedral mesh can approximate. Starts from a mesh, or from boundary curves "
         "alone, of which several surfaces are tried."
     )
-    pictures: ClassVar[Mapping[str, Writer]] = {"curvature.png": _curvature, "edges.png": draw_edges}
+    pictures: ClassVar[Mapping[str, Writer]] = {"curvature.png": _curvature, "edges.png": edges_of("start", "result")}
 
     def settings(self) -> type[Any]:
         """See the base class."""

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from .distances import from_segments
 from .errors import CommandError
 from .inputs import read_input
 
@@ -63,9 +64,7 @@ class FormInput(NamedTuple):
         words = "--through " + " ".join(f"{x:g}" for x in point)
         rim = vertices[topology.boundary_edges]
         if rim.numel():
-            start, way = rim[:, 0], rim[:, 1] - rim[:, 0]
-            share = ((place - start) * way).sum(1) / (way * way).sum(1).clamp_min(1e-300)
-            gap = float((start + share.clamp(0.0, 1.0)[:, None] * way - place).norm(dim=1).min())
+            gap = float(from_segments(place, rim).min())
             edge = float(edge_lengths(vertices, topology).mean())
             if gap < _ON_THE_RIM * edge:
                 self.notes.append(f"{words} lies on the boundary, which passes there anyway: left out")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -150,9 +151,10 @@ def _measured(mesh: PolygonMesh, reference: tuple[Tensor, Topology] | None, argu
 
 def _entries(mesh: PolygonMesh, found: Measured, arguments: argparse.Namespace) -> dict[str, Any]:
     """For JSON."""
-    names = mesh.names
-    edges = [{**asdict(row), "vertices_in_file": [int(names.vertex(v)) for v in row.vertices]} for row in found.edges]
-    panels = [{**asdict(row), "vertices_in_file": [int(names.vertex(v)) for v in row.vertices]} for row in found.panels]
+
+    def listed(rows: Sequence[EdgeMeasures] | Sequence[PanelMeasures]) -> list[dict[str, Any]]:
+        return [{**asdict(row), "vertices_in_file": [int(mesh.names.vertex(v)) for v in row.vertices]} for row in rows]
+
     return {
         **{quantity.key: quantity.value for quantity in found.quantities},
         "verdict": found.verdict,
@@ -160,8 +162,8 @@ def _entries(mesh: PolygonMesh, found: Measured, arguments: argparse.Namespace) 
         "repairs": list(mesh.repairs),
         "notes": list(mesh.notes),
         "units": {quantity.key: unit_of(quantity) for quantity in found.quantities},
-        "worst_edges": edges,
-        "worst_panels": panels,
+        "worst_edges": listed(found.edges),
+        "worst_panels": listed(found.panels),
         **found.lists,
         "curvature_doubts": found.doubts,
     }

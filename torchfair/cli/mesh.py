@@ -18,6 +18,7 @@ from .mesh_planar import made_planar
 from .options import SettingOptions
 from .outputs import Outputs, add_outputs, asked_for
 from .parser import CommandParser
+from .pictures import edges_of
 from .reading import in_numbers_of, read_report
 from .request import Request, Writer
 from .several import add_inputs
@@ -107,7 +108,7 @@ def check(arguments: argparse.Namespace) -> MeshingSettings:
 def run(arguments: argparse.Namespace) -> int:
     """Checks what can be checked first, then reads, meshes, writes and prints."""
     settings = check(arguments)
-    outputs = MeshOutputs(arguments, {"mesh.png": draw_singular, "edges.png": _edges})
+    outputs = MeshOutputs(arguments, {"mesh.png": draw_singular, "edges.png": edges_of("surface", "mesh")})
     outputs.prepare()
     surface = read_input(arguments.input, arguments)
     outputs.make_folders(surface, 0)
@@ -180,13 +181,6 @@ def draw_singular(path: Path, request: Request, result: Any, overwrite: bool) ->
     picture_principal_mesh(
         path, result.vertices, result.topology, points, indices, creases=creases, view=request.view, overwrite=overwrite
     )
-
-
-def _edges(path: Path, request: Request, result: Any, overwrite: bool) -> None:
-    from ..viewing import picture_edges
-
-    meshes = {"surface": request.mesh.vertices, "mesh": result.vertices}
-    picture_edges(path, meshes, [request.mesh.topology, result.topology], view=request.view, overwrite=overwrite)
 
 
 def table(report: Mapping[str, Any]) -> list[str]:

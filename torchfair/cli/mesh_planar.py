@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from .._interrupts import deferred_interrupts
-
 if TYPE_CHECKING:
     from ..io import PolygonMesh
     from ..meshing import QuadMesh
@@ -27,12 +25,11 @@ class PlanarMesh(NamedTuple):
 
 
 def made_planar(mesh: QuadMesh, surface: PolygonMesh, *, quiet: bool) -> PlanarMesh:
-    """The mesh with planar polygons near the surface. Ctrl-C ends the solve, not the command: the best mesh is kept."""
-    with deferred_interrupts():
-        from ..formfinding import PLANAR_QUADS, planar_quads
-        from ..progress import ProgressDisplay
+    """The mesh with planar polygons near the surface; to be called where Ctrl-C waits, which ends the solve."""
+    from ..formfinding import PLANAR_QUADS, planar_quads
+    from ..progress import ProgressDisplay
 
-        with ProgressDisplay(PLANAR_QUADS.projection.max_iterations) as display:
-            made, job = planar_quads(mesh, (surface.vertices, surface.topology), callback=None if quiet else display)
+    with ProgressDisplay(PLANAR_QUADS.projection.max_iterations) as display:
+        made, job = planar_quads(mesh, (surface.vertices, surface.topology), callback=None if quiet else display)
     missed = [str(promise) for promise in job.promises if not promise.holds]
     return PlanarMesh(made, missed, job.projection.status)

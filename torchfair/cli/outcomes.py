@@ -30,17 +30,16 @@ class Outcome:
         words = self.error if self.code == EXIT_INTERRUPTED or not self.error else f"error: {self.error}"
         return " ".join(f"{self.name}: {words}".split()) if words else ""
 
-    @property
-    def words(self) -> str:
-        """How it ended, for a list of many."""
+    def told(self, what: str) -> str:
+        """How it ended for one of many, whose name stands before it."""
         if self.error:
-            return " ".join(self.error.split())
+            return f"{what}: {' '.join(self.error.split()).removeprefix(f'{what}: ')}"
         known = {
             EXIT_OK: "done",
             EXIT_NOT_REACHED: "something that was asked for was not reached",
             EXIT_INTERRUPTED: "interrupted",
         }
-        return known.get(self.code, f"ended with code {self.code}")
+        return f"{what}: {known.get(self.code, f'ended with code {self.code}')}"
 
 
 def outcome_of(run: Callable[[], int], name: str) -> Outcome:

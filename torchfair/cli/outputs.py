@@ -100,7 +100,23 @@ class Outputs:
 
     def save(self, request: Request, result: Any, report: Report) -> None:
         """Writes what must not be lost; to be called where Ctrl-C waits."""
-        self._keep(request, result, report)
+        asked, old, fault = self.names, listed_in(self.report, self.names.stem) if self.force else [], None
+        for names in places(asked, self.paths):
+            self.names = names
+            try:
+                notes = self._mesh_and_report(request, result, report)
+            except (TorchfairError, OSError) as error:
+                fault = fault or error
+                self.force = False
+                continue
+            request.notes += notes
+            if fault is None:
+                self._remove([*old, *(path for path in self.paths() if self.force)], {self.mesh, self.report})
+            else:
+                self._faults.append(f"{_words(fault)}; the mesh is {self.mesh} instead, its report {self.report}")
+            return
+        assert fault is not None
+        raise fault
 
     def save_more(self, request: Request, result: Any, report: Report) -> None:
         """Makes what takes long and writes it, with the report anew."""
@@ -144,25 +160,6 @@ class Outputs:
         print("\n".join([*(f"wrote {path}" for path in there), *lost, *missed]))
         if self._faults:
             raise CommandError("; ".join(self._faults))
-
-    def _keep(self, request: Request, result: Any, report: Report) -> None:
-        asked, old, fault = self.names, listed_in(self.report, self.names.stem) if self.force else [], None
-        for names in places(asked, self.paths):
-            self.names = names
-            try:
-                notes = self._mesh_and_report(request, result, report)
-            except (TorchfairError, OSError) as error:
-                fault = fault or error
-                self.force = False
-                continue
-            request.notes += notes
-            if fault is None:
-                self._remove([*old, *(path for path in self.paths() if self.force)], {self.mesh, self.report})
-            else:
-                self._faults.append(f"{_words(fault)}; the mesh is {self.mesh} instead, its report {self.report}")
-            return
-        assert fault is not None
-        raise fault
 
     def _mesh_and_report(self, request: Request, result: Any, report: Report) -> list[str]:
         """Writes both, and what stands beside the mesh; what the file of the mesh does not hold."""

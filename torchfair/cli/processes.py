@@ -143,8 +143,7 @@ def _all_ended(running: dict[int, _Process]) -> Iterator[None]:
 
 
 def _say(count: int, requests: Sequence[Any], number: int, outcome: Outcome) -> None:
-    name = requests[number].input
-    print(f"[{count}/{len(requests)}] {name}: {outcome.words.removeprefix(f'{name}: ')}", file=sys.stderr, flush=True)
+    print(f"[{count}/{len(requests)}] {outcome.told(requests[number].input)}", file=sys.stderr, flush=True)
 
 
 def _processors() -> int:

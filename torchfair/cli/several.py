@@ -164,7 +164,7 @@ def _listed(name: str, requests: Sequence[argparse.Namespace], outcomes: Sequenc
     if not bad:
         return EXIT_OK
     lines = [f"{name}: {len(requests) - len(bad)} of {len(requests)} done"]
-    lines += [f"  {request.input}: {end.words.removeprefix(f'{request.input}: ')}" for request, end in bad]
+    lines += [f"  {end.told(request.input)}" for request, end in bad]
     print("\n".join(lines), file=sys.stderr, flush=True)
     interrupted = any(end.code == EXIT_INTERRUPTED for _, end in bad)
     return EXIT_INTERRUPTED if interrupted else EXIT_NOT_REACHED

@@ -24,7 +24,7 @@ from .inputs import (
 )
 from .job_command import JobCommand
 from .outputs import Outputs
-from .pictures import draw_edges
+from .pictures import edges_of
 from .reading import in_numbers_of
 from .request import Request, Writer
 from .result_files import not_held
@@ -65,7 +65,7 @@ class SymmetricCommand(JobCommand):
         "edges are line elements, beside others stands NAME.edges.json."
     )
     option_names: ClassVar[Mapping[str, str]] = {"most_steps": "steps"}
-    pictures: ClassVar[Mapping[str, Writer]] = {"principal.png": _principal, "edges.png": draw_edges}
+    pictures: ClassVar[Mapping[str, Writer]] = {"principal.png": _principal, "edges.png": edges_of("start", "result")}
 
     def settings(self) -> type[Any]:
         """See the base class."""
