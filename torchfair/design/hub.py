@@ -71,7 +71,7 @@ class Hub:
         self.session, self._keeper, self._make_engine = session, keeper, make_engine
         self.engine: Engine | None = None
         self._windows: dict[int, Window] = {}
-        self._opened = 0
+        self._opened = self._engines = 0
         self._tasks: set[asyncio.Task[None]] = set()
 
     def start(self, opening: Open | None) -> None:
@@ -196,7 +196,6 @@ class Hub:
 
         self.engine = self._make_engine(said, lost)
 
-    _engines = 0
     _WAYS: Mapping[type, Callable[[Any, Any], None]] = {
         Tell: _tell,
         Draw: _draw,

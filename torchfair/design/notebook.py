@@ -47,12 +47,10 @@ class DesignView:
         Raises:
             LookupError: nothing is open yet.
         """
-        import torch
-
-        from .engine.recipes import topology_of
+        from .engine.recipes import tensor_of, topology_of
 
         document = self._server.server.session.history.now
-        return torch.from_numpy(document.vertices.copy()), topology_of(document)
+        return tensor_of(document.vertices), topology_of(document)
 
     def close(self) -> None:
         """Ends the server."""

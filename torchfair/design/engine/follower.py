@@ -14,7 +14,7 @@ from ...formfinding import Session
 from ...topology import Topology
 from ..document import Document, Floats, Place
 from .measures import Deviation
-from .recipes import AnyRecipe, put, same_job, session_of, topology_of
+from .recipes import AnyRecipe, put, same_job, session_of, tensor_of, topology_of
 from .sliders import weight_range
 
 _CALM = 0.03
@@ -65,7 +65,7 @@ class Follower:
         """(V, 3) where the mesh is; to the bit as in the document where nothing has moved."""
         if self._moved:
             return self.session.vertices
-        return torch.from_numpy(self.document.vertices.copy())
+        return tensor_of(self.document.vertices)
 
     @property
     def places(self) -> Floats:
@@ -141,7 +141,7 @@ class Follower:
         if self._deviation is None:
             *_, root = self.document.levels()
             topology = self.topology if root is self.document else topology_of(root)
-            self._deviation = Deviation(torch.from_numpy(root.start.copy()), topology)
+            self._deviation = Deviation(tensor_of(root.start), topology)
         return self._deviation
 
     def promises(self) -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..containers import pack
 from ..document import Document
+from .recipes import tensor_of
 
 PRINCIPAL, BOUNDARY, CREASE = 1, 2, 4
 """Bits of the labels of edges."""
@@ -24,7 +25,7 @@ def topology_message(document: Document, topology: Topology, number: int) -> byt
         topology: Its connectivity.
         number: Of the topology.
     """
-    start = torch.from_numpy(document.start.copy())
+    start = tensor_of(document.start)
     size = document.start.max(0) - document.start.min(0)
     message = {
         "type": "topology",

@@ -16,6 +16,11 @@ from .sliders import settings_of
 AnyRecipe = FairRecipe | FormRecipe | SymmetricRecipe
 
 
+def tensor_of(array: np.ndarray) -> Tensor:
+    """A copy of an array of a document, which nothing may change."""
+    return torch.from_numpy(array.copy())
+
+
 def topology_of(document: Document) -> Topology:
     """Connectivity of a document."""
     return Topology.from_packed_faces(document.faces.corners, document.faces.offsets, document.count)
@@ -35,8 +40,8 @@ def principal_of(document: Document, topology: Topology) -> PrincipalEdges:
     if not topology.is_triangular:
         raise MeshError("principal-symmetric meshes are triangle meshes: mesh this surface with triangles first")
     if document.principal is not None:
-        return PrincipalEdges(topology, torch.from_numpy(document.principal.copy()))
-    found = principal_edges_from_directions(torch.from_numpy(document.vertices.copy()), topology, allow_exceptions=True)
+        return PrincipalEdges(topology, tensor_of(document.principal))
+    found = principal_edges_from_directions(tensor_of(document.vertices), topology, allow_exceptions=True)
     return found.edges
 
 
@@ -56,7 +61,7 @@ def put(session: Session[AnyRecipe], document: Document) -> None:
     recipe = session.recipe
     recipe.pulls.free(torch.arange(document.count))
     recipe.take_settings(settings_of(document))
-    session.place(_tensor(document.vertices))
+    session.place(tensor_of(document.vertices))
     if document.held:
         session.hold(document.held)
     if document.handles:
@@ -87,7 +92,7 @@ def _at_the_start(document: Document) -> Session[AnyRecipe]:
     settings = settings_of(document)
     if document.coarse is not None:
         return session_of(_in_the_same_job(document.coarse, document)).refined()
-    topology, start = topology_of(document), _tensor(document.start)
+    topology, start = topology_of(document), tensor_of(document.start)
     if document.mode == "fair":
         return Session(FairRecipe(start, topology, settings=settings))
     if document.mode == "form":
@@ -99,7 +104,3 @@ def _in_the_same_job(coarse: Document, fine: Document) -> Document:
     """The coarser mesh, with the choices of the finer one."""
     chosen = fine.choices.get(fine.mode, {})
     return coarse.choosing(chosen) if chosen else coarse
-
-
-def _tensor(array: np.ndarray) -> Tensor:
-    return torch.from_numpy(np.array(array, dtype=np.float64))

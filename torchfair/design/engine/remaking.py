@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from ...errors import MeshError
 from ...meshing import principal_quads, principal_triangles
 from ...principal import PrincipalEdges, misalignment_of
+from ...topology import Topology
 from ..command_line import job_step
 from ..document import Document
 from ..limits import MOST_VERTICES
-from .recipes import faces_of, principal_of, session_of, topology_of
+from .recipes import faces_of, principal_of, session_of, tensor_of, topology_of
 
 
 def remade(document: Document, how: str, options: Mapping[str, Any]) -> tuple[Document, list[str]]:
@@ -32,24 +34,26 @@ def _subdivided(document: Document, options: Mapping[str, Any]) -> tuple[Documen
     if 4 * document.count > MOST_VERTICES:
         raise MeshError(f"the finer mesh would have about {4 * document.count} vertices, at most {MOST_VERTICES}")
     recipe = session_of(document).refined().recipe
-    vertices = recipe.given.numpy().copy()
     held = torch.nonzero(recipe.pulls.held).squeeze(1).tolist()
     principal = getattr(recipe, "principal", None)
-    if principal is None and document.principal is not None:
+    if principal is None:
         principal = _carried(document)
     finer = replace(
-        document,
-        faces=faces_of(recipe.topology),
-        start=vertices,
-        vertices=vertices,
+        _of_mesh(document, recipe.given, recipe.topology, principal),
         coarse=document,
-        principal=None if principal is None else principal.mask.numpy().copy(),
         handles={vertex: (x, y, z) for vertex, (x, y, z) in recipe.handles.items()},
         held=tuple(held),
-        names=None if document.names is None else _kept_names(document.names, len(vertices)),
+        names=None if document.names is None else _kept_names(document.names, recipe.topology.num_vertices),
         words="subdivide",
     )
     return finer, [f"{document.count} vertices became {finer.count}"]
+
+
+def _of_mesh(document: Document, vertices: Tensor, topology: Topology, principal: PrincipalEdges | None) -> Document:
+    """The document with another mesh, whose vertices have not moved yet."""
+    places = vertices.numpy().copy()
+    mask = None if principal is None else principal.mask.numpy().copy()
+    return replace(document, faces=faces_of(topology), start=places, vertices=places, principal=mask)
 
 
 def _carried(document: Document) -> PrincipalEdges | None:
@@ -57,9 +61,9 @@ def _carried(document: Document) -> PrincipalEdges | None:
     from ...subdivision import hybrid
 
     topology = topology_of(document)
-    if not topology.is_triangular:
+    if document.principal is None or not topology.is_triangular:
         return None
-    marked = PrincipalEdges(topology, torch.from_numpy(document.principal))
+    marked = PrincipalEdges(topology, tensor_of(document.principal))
     return marked.refine(hybrid(topology))
 
 
@@ -70,19 +74,13 @@ def _kept_names(names: np.ndarray, count: int) -> np.ndarray:
 
 
 def _meshed(document: Document, options: Mapping[str, Any]) -> tuple[Document, list[str]]:
-    vertices, topology = torch.from_numpy(document.vertices.copy()), topology_of(document)
+    vertices, topology = tensor_of(document.vertices), topology_of(document)
     make = principal_quads if options["kind"] == "quads" else principal_triangles
     made = make(vertices, topology, count=options["count"])
-    places = made.vertices.numpy().copy()
-    principal = getattr(made, "principal", None)
     step = {"do": "mesh", **options}
     meshed = replace(
-        document,
-        faces=faces_of(made.topology),
-        start=places,
-        vertices=places,
+        _of_mesh(document, made.vertices, made.topology, getattr(made, "principal", None)),
         coarse=None,
-        principal=None if principal is None else principal.mask.numpy().copy(),
         handles={},
         held=(),
         names=None,
@@ -106,7 +104,7 @@ def _labelled(document: Document, options: Mapping[str, Any]) -> tuple[Document,
     if not options["edges"]:
         found = principal_of(replace(document, principal=None), topology)
         mask = found.mask.numpy().copy()
-        angle = misalignment_of(torch.from_numpy(document.vertices.copy()), found)
+        angle = misalignment_of(tensor_of(document.vertices), found)
         said = [f"principal edges are {angle:.2f} radians off the nearer principal direction on average"]
     else:
         topology.require_triangles()

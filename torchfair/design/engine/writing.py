@@ -16,7 +16,7 @@ from ...principal import DevelopableStrips, developable_strips, save_strips_svg,
 from ..containers import pack
 from ..document import Document
 from ..formats import FORMATS
-from .recipes import principal_of, topology_of
+from .recipes import principal_of, tensor_of, topology_of
 
 _HEIGHT = 0.5  # mean edges
 _SHARE = 0.8  # of the height at which rulings meet
@@ -36,8 +36,8 @@ def file_bytes(document: Document, format: str) -> bytes:
         topology = topology_of(document)
         lines = []
         if format == "obj" and document.principal is not None:
-            lines = polylines_along(topology, torch.from_numpy(document.principal.copy()))
-        save_mesh(path, torch.from_numpy(document.vertices.copy()), topology, polylines=lines)
+            lines = polylines_along(topology, tensor_of(document.principal))
+        save_mesh(path, tensor_of(document.vertices), topology, polylines=lines)
         return path.read_bytes()
 
 
@@ -47,7 +47,7 @@ def strips_of(document: Document) -> DevelopableStrips:
     Raises:
         TorchfairError: there are none.
     """
-    vertices, topology = torch.from_numpy(document.vertices.copy()), topology_of(document)
+    vertices, topology = tensor_of(document.vertices), topology_of(document)
     principal = principal_of(document, topology)
     stars = principal.stars()
     if not stars.vertices.numel():
