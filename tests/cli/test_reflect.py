@@ -1,15 +1,21 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
+import torch
 from PIL import Image
 
+from torchfair.cameras import OrthographicCamera
 from torchfair.cli import main
 from torchfair.io import load_mesh, save_mesh
-from torchfair.reflection import reflection_score
+from torchfair.reflection import SmoothReference, default_camera, reflection_score
 from torchfair.shapes import PrincipalParaboloid, irregular_triangles, principal_quads
+from torchfair.viewing.chosen_view import chosen_view
+from torchfair.viewing.sheet import MARGIN
 
 KEYS = ("score", "reflection_variation", "rms", "wobble")
 SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
@@ -159,3 +165,39 @@ def test_interruption_leaves_whole_files_only(
         "mesh.views.png",
         "mesh.differences.png",
     }
+
+
+def test_one_view_is_scored_alone_and_its_notes_are_whole(
+    mesh_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mesh = load_mesh(mesh_file)
+    angles = (30.0, 20.0)
+    folder = tmp_path / "out"
+    command = ["reflect", mesh_file, "--json", "--size", "64", "--view", "30,20", "--up", "y"]
+    assert main([*command, "-o", str(folder), "--frames", "0"]) == 0
+    report = read_json(capsys.readouterr().out)
+    view = chosen_view(mesh.vertices, mesh.topology, "y", angles)
+    camera = OrthographicCamera.fit(mesh.vertices, directions=-view.towards_eye, ups=view.up)
+    expected = reflection_score(mesh.vertices, mesh.topology, camera=camera, size=64)
+    assert report["score"] == float(expected.score)
+    assert report["view_directions"] == (-view.towards_eye)[None].tolist()
+    elevation = math.degrees(math.asin(float(view.towards_eye[1])))
+    assert elevation == pytest.approx(20.0)
+    with Image.open(folder / "mesh.views.png") as sheet:
+        gray = np.asarray(sheet.convert("L"))
+    assert (gray[:, -MARGIN // 2 :] == 255).all(), "a note runs out of the sheet"
+
+
+def test_what_is_up_turns_all_views_and_the_turntable(
+    mesh_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    films = []
+    for up in "zy":
+        folder = tmp_path / up
+        assert main(["reflect", mesh_file, "--json", "-o", str(folder), *FEW_PIXELS, "--up", up]) == 0
+        assert len(read_json(capsys.readouterr().out)["score_by_view"]) == 6  # type: ignore[arg-type]
+        films.append((folder / "mesh.turntable.gif").read_bytes())
+    assert films[0] != films[1]
+    mesh = load_mesh(mesh_file)
+    ups = default_camera(SmoothReference.of_mesh(mesh.vertices, mesh.topology), torch.eye(3)[1]).axes[:, 1]
+    assert (ups[:, 1] > 0.5).all()

@@ -40,6 +40,15 @@ def one_line(capsys: pytest.CaptureFixture[str]) -> str:
     return said.err
 
 
+def test_inputs_may_stand_on_both_sides_of_options(meshes: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["measure", meshes[0], meshes[2], "--json"]) == 0
+    expected = capsys.readouterr().out
+    assert main(["measure", meshes[0], "--json", meshes[2]]) == 0
+    assert capsys.readouterr().out == expected
+    assert main(["measure", meshes[0], "--json", meshes[2], "--unknown"]) == 2
+    assert "--unknown" in one_line(capsys)
+
+
 def test_measures_of_several_meshes_are_rows_columns_or_objects(
     meshes: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

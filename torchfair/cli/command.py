@@ -76,6 +76,8 @@ def _parse(argv: Sequence[str] | None, parsed: list[argparse.Namespace]) -> int:
     """Adds arguments of a command that is to be run, if there is one, to ``parsed``."""
     parser = build_parser()
     arguments, unknown = parser.parse_known_args(argv)
+    if isinstance(getattr(arguments, "input", None), list) and not any(word.startswith("-") for word in unknown):
+        arguments.input, unknown = arguments.input + unknown, []  # inputs may stand on both sides of options
     if unknown:  # argparse would name the parser of all commands here
         name = getattr(arguments, "name", "torchfair")
         raise CommandError(f"unrecognized arguments: {' '.join(unknown)} ({name} --help lists the options)", name)

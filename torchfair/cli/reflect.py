@@ -14,10 +14,13 @@ from .inputs import add_repair, read_input
 from .reading import said_of
 from .several import add_inputs
 from .told_files import told_files, written_with_report
+from .views import add_views, view_of
 
 if TYPE_CHECKING:
+    from ..cameras import Camera
     from ..io import PolygonMesh
     from ..reflection import ReflectionScore
+    from ..viewing import ViewDirection
 
 NAME = "torchfair reflect"
 REPORT = "reflection.json"
@@ -60,6 +63,7 @@ def add_parser(subparsers: Any) -> None:
         "direction (default: such that the smooth surface shows about four)")  # fmt: skip
     add("--frames", type=count, default=24, metavar="N", help="pictures of the turntable, 0 for none (default 24)")
     add("--no-pictures", action="store_true", help="write no pictures and no turntable")
+    add_views(parser, label=False, view="score and pictures of this view alone")
     add("--force", action="store_true", help="replace files that exist")
     add_repair(parser)
     parser.set_defaults(run=run, name=NAME, output_is_folder=True)
@@ -75,7 +79,8 @@ def run(arguments: argparse.Namespace) -> int:
     mesh = read_input(arguments.input, arguments)
     reference = read_input(arguments.reference, arguments) if arguments.reference else None
     with threads_for(0, mesh.vertices.device):  # pictures of this size are made of very short operations
-        score = _score(mesh, reference, arguments)
+        view = view_of(arguments, mesh)
+        score = _score(mesh, reference, view, arguments)
         report: dict[str, Any] = dict(score.numbers())
         report |= _compared(score) | {
             "file": arguments.input,
@@ -84,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
             "notes": list(mesh.notes),
         }
         if files:
-            write(files, mesh, score, report, arguments)
+            write(files, mesh, score, view, report, arguments)
     if arguments.json:
         from ..io import to_json
 
@@ -144,6 +149,7 @@ def write(
     files: list[Path],
     mesh: PolygonMesh,
     score: ReflectionScore,
+    view: ViewDirection | None,
     report: dict[str, Any],
     arguments: argparse.Namespace,
 ) -> None:
@@ -163,21 +169,36 @@ def write(
         with frame_progress(arguments.frames, "turntable") as progress:
             turntable(
                 film, mesh.vertices, mesh.topology, score.setup.reference,
-                frames=arguments.frames, size=min(arguments.size, _LARGEST_FRAME), progress=progress,
+                up=None if view is None else view.up, frames=arguments.frames,
+                size=min(arguments.size, _LARGEST_FRAME), progress=progress,
                 overwrite=arguments.force,
             )  # fmt: skip
 
 
-def _score(mesh: PolygonMesh, reference: PolygonMesh | None, arguments: argparse.Namespace) -> ReflectionScore:
+def _score(
+    mesh: PolygonMesh, reference: PolygonMesh | None, view: ViewDirection | None, arguments: argparse.Namespace
+) -> ReflectionScore:
     from ..reflection import reflection_score
 
     return reflection_score(
         mesh.vertices,
         mesh.topology,
         None if reference is None else (reference.vertices, reference.topology),
+        camera=None if view is None else _camera(mesh if reference is None else reference, view, arguments),
         frequency=arguments.frequency,
         size=arguments.size,
     )
+
+
+def _camera(smooth: PolygonMesh, view: ViewDirection, arguments: argparse.Namespace) -> Camera:
+    """The one view that is asked for, or the usual ones with something else up."""
+    from ..cameras import OrthographicCamera
+    from ..reflection import SmoothReference, default_camera
+
+    if arguments.view is None:
+        return default_camera(SmoothReference.of_mesh(smooth.vertices, smooth.topology), view.up)
+    points = smooth.vertices[smooth.topology.corners]
+    return OrthographicCamera.fit(points, directions=-view.towards_eye, ups=view.up)
 
 
 def _files(arguments: argparse.Namespace) -> list[Path]:

@@ -14,13 +14,13 @@ _Y_UP = (".glb", ".gltf")  # by their definition; other formats do not say
 LABELS = "labels.png"
 
 
-def add_views(parser: argparse.ArgumentParser, *, label: bool = True) -> None:
-    """The options of pictures."""
+def add_views(parser: argparse.ArgumentParser, *, label: bool = True, view: str = "from where") -> None:
+    """The options of pictures; ``view`` says what ``--view`` changes."""
     add = parser.add_argument
     add("--up", choices=("x", "y", "z"), help="what is up in pictures (default: y of GLB and glTF files, else the axis "
         "nearest to the average normal, or z)")  # fmt: skip
-    add("--view", type=_view, metavar="VIEW", help="from where: front, top, iso, or AZ,EL in degrees (azimuth from the "
-        "front, anticlockwise from above; elevation); default: three-quarter")  # fmt: skip
+    add("--view", type=_view, metavar="VIEW", help=f"{view}: front, top, iso, or AZ,EL in degrees (azimuth from the "
+        "front, anticlockwise from above; elevation); default: the usual ones")  # fmt: skip
     if label:
         add("--label", action="store_true", help=f"also write {LABELS}: the mesh with numbers of vertices as in the "
             "file, of all if they are few, else of the worst places")  # fmt: skip

@@ -20,8 +20,8 @@ _CONE = 40.0
 _VIEWS = 6
 
 
-def default_camera(reference: SmoothReference) -> OrthographicCamera:
-    """Six parallel views that fit the reference.
+def default_camera(reference: SmoothReference, up: Tensor | None = None) -> OrthographicCamera:
+    """Six parallel views that fit the reference; ``up`` (3,) appears vertical, by default z.
 
     Open patches are seen from within 40 degrees of their mean normal, the first view along it. Closed bodies are seen
     along six perpendicular directions, turned against the coordinate axes so that they do not run along the faces of
@@ -29,7 +29,7 @@ def default_camera(reference: SmoothReference) -> OrthographicCamera:
     """
     normal = mean_normal(reference)
     views = axis_directions(_turn()) if normal is None else cone_directions(-normal, _CONE, _VIEWS)
-    return OrthographicCamera.fit(reference.vertices[reference.topology.corners], directions=views)
+    return OrthographicCamera.fit(reference.vertices[reference.topology.corners], directions=views, ups=up)
 
 
 def default_stripe_directions(reference: SmoothReference) -> Tensor:

@@ -13,6 +13,7 @@ from .shading import STRIPES_DARK, STRIPES_LIGHT
 from .sheet import CAPTION, MARGIN, Sheet
 
 _GAP = 16
+_LETTER = 12  # pixels, at most, of a letter of a note
 _PAPER = (1.0, 1.0, 1.0)
 _LARGEST = (0.70, 0.05, 0.10)  # colour of a difference of 1
 _LEFT_OUT = (0.88, 0.89, 0.91)
@@ -115,19 +116,22 @@ def _write(
     views, height, width, _ = next(iter(rows.values())).shape
     above = CAPTION * (2 if scores else 1)
     line, size = height + above, min(24, width / 9)
-    sheet = Sheet(2 * MARGIN + views * width + (views - 1) * _GAP, len(rows) * line + CAPTION + MARGIN // 2, title)
+    columns = views * width + (views - 1) * _GAP
+    wide = 2 * MARGIN + max(columns, _LETTER * max(map(len, rows)))  # notes over a single picture may be wider than it
+    sheet = Sheet(wide, len(rows) * line + CAPTION + MARGIN // 2, title)
+    first = (wide - columns) // 2
     for number, (note, pictures) in enumerate(rows.items()):
         top = sheet.top + number * line
         sheet.note(note, MARGIN, top)
         for view, picture in enumerate(pictures):
-            left = MARGIN + view * (width + _GAP)
+            left = first + view * (width + _GAP)
             sheet.image(picture, left, top + above)
             if scores:
                 middle = left + width / 2, top + 1.5 * CAPTION
                 sheet.text(f"{scores[number][view]:.3f}", *middle, size, ha="center", va="center")
     for view, caption in enumerate(captions):
         sheet.text(
-            caption, MARGIN + view * (width + _GAP) + width / 2, sheet.top + len(rows) * line + CAPTION / 2,
+            caption, first + view * (width + _GAP) + width / 2, sheet.top + len(rows) * line + CAPTION / 2,
             size, ha="center", va="center",
         )  # fmt: skip
     return sheet.write(path, overwrite=overwrite)

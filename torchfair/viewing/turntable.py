@@ -29,6 +29,7 @@ def turntable(
     topology: Topology,
     reference: SmoothReference | None = None,
     *,
+    up: Tensor | None = None,
     frames: int = 36,
     size: int = 320,
     progress: Callable[[int], object] | None = None,
@@ -43,6 +44,7 @@ def turntable(
         vertices: positions ``(V, 3)``, finite.
         topology: connectivity.
         reference: the smooth surface to show beside the mesh; by default the mesh itself, smoothly shaded.
+        up: (3,) the axis of the turntable, by default what :func:`view_direction` takes for up.
         frames: pictures per turn, at least 1.
         size: rows of pixels; there are twice as many columns.
         progress: called with the number of finished frames.
@@ -57,7 +59,7 @@ def turntable(
 
     smooth = reference or SmoothReference.of_mesh(vertices, topology)
     vertices, smooth = _normalised(one_finite_mesh(vertices, topology), topology, smooth)
-    up = view_direction(vertices, topology).up
+    up = view_direction(vertices, topology).up if up is None else up
     directions = ring_directions(up, _ELEVATION, frames)
     stripes = Stripes(up, _BANDS / 2)
     everything = OrthographicCamera.fit(vertices[topology.corners], smooth.vertices, directions=directions, ups=up)
