@@ -13,10 +13,13 @@ from ...errors import TorchfairError
 from ...formfinding import Session
 from ...topology import Topology
 from ..document import Document, Floats, Place
+from .coarse import coarse_answer
 from .measures import Deviation
 from .recipes import AnyRecipe, put, same_job, session_of, tensor_of, topology_of
 from .sliders import weight_range
 
+_COARSE_FROM = 8000
+"""Vertices: of larger meshes a step takes half a second and more."""
 _CALM = 0.03
 """Mean edges: after a step that moves no vertex farther than this, the mesh waits for the next move of the mouse."""
 
@@ -103,6 +106,20 @@ class Follower:
         if places:
             self.session.move(places)
         self.document = replace(document, vertices=self.document.vertices)
+
+    def coarse(self) -> Tensor | None:
+        """(V, 3) what a large mesh shows before its step: humps around handles; None for others, or where none is away.
+
+        The mesh of the session is not touched.
+        """
+        pulled = self.document.handles
+        if self.document.count < _COARSE_FROM or not pulled:
+            return None
+        recipe, now, handles = self.session.recipe, self.vertices, torch.tensor(list(pulled))
+        places = torch.tensor(list(pulled.values()), dtype=now.dtype)
+        if float(torch.linalg.vector_norm(places - now[handles], dim=1).max()) <= _CALM * recipe.unit.length:
+            return None
+        return coarse_answer(now, self.topology, handles, places, recipe.stays() | recipe.pulls.held)
 
     def step(self) -> Stepped:
         """One live step.

@@ -57,6 +57,12 @@ class Inbox:
         self._waiting.popleft()
         return first
 
+    def comes_within(self, seconds: float) -> bool:
+        """Whether something waits, or comes soon."""
+        if not self.has_more() and self._pipe.poll(seconds):
+            self.drain()
+        return bool(self._waiting)
+
     def wait(self) -> None:
         """Until something comes."""
         self._take(self._pipe.recv())

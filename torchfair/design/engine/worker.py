@@ -27,6 +27,7 @@ from .writing import file_bytes, strips_message
 
 _BETWEEN_NUMBERS = 0.1  # seconds
 _BETWEEN_FRAMES = 1.0 / 40.0
+_PAUSE = 0.15  # seconds without a move of the mouse, after which a large mesh takes a step
 _FAULTS = (TorchfairError, OSError, RuntimeError, ValueError, IndexError, MemoryError)
 
 
@@ -47,6 +48,7 @@ class Worker:
         self._follower: Follower | None = None
         self._views: tuple[str, ...] = ()
         self._worst, self._shown_number = 8, -1
+        self._told_settings: dict[str, Any] = {}
         self._measured = self._framed = -1e9
 
     def run(self) -> None:
@@ -118,8 +120,13 @@ class Worker:
             if self._inbox.paused:
                 self._inbox.wait()
                 continue
+            coarse = follower.coarse()
+            if coarse is not None:
+                self._show_vertices(coarse, drag.serial, DRAGGING, drag.count)
+                if self._inbox.comes_within(_PAUSE):
+                    continue
             stepped = follower.step()
-            if stepped.moved:
+            if stepped.moved or coarse is not None:
                 self._show(drag.serial, DRAGGING, drag.count)
             self._measure(drag.serial, now=not stepped.goes_on)
             if not stepped.goes_on and not self._inbox.has_more():
@@ -160,7 +167,13 @@ class Worker:
             message = topology_message(follower.document, follower.topology, follower.number)
             self._say(say.Said(serial, "topology", message))
             self._shown_number = follower.number
-        self._say(say.Said(serial, "settings", settings_message(follower.document)))
+        self._tell_settings(serial)
+
+    def _tell_settings(self, serial: int) -> None:
+        message = settings_message(self._following().document)
+        if message != self._told_settings:
+            self._told_settings = message
+            self._say(say.Said(serial, "settings", message))
 
     def _show(self, serial: int, flags: int, count: int = 0) -> None:
         self._show_vertices(self._following().vertices, serial, flags, count)
@@ -198,6 +211,7 @@ class Worker:
 
     def _done(self, serial: int, *, stopped: bool) -> None:
         follower = self._following()
+        self._tell_settings(serial)
         self._say(say.Done(serial, follower.places, stopped, follower.notes))
 
     def _watching(self, request: r.Watch) -> None:
