@@ -1,7 +1,13 @@
 """Sphinx configuration: Markdown pages, the theme, and pages that need no network."""
 
 import re
+import sys
+from importlib import import_module
+from inspect import ismodule
 
+from sphinx.util import logging
+
+import torchfair
 from torchfair import __version__
 
 project = "torchfair"
@@ -16,18 +22,16 @@ exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = f"torchfair {__version__}"
 autodoc_member_order = "bysource"
-autodoc_typehints = "none"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+maximum_signature_line_length = 90
 napoleon_google_docstring = True
 nitpicky = True  # a reference that leads nowhere is a warning
 nitpick_ignore_regex = [
-    ("py:class", r"(torch|abc|collections|scipy|numpy|pathlib)\..*"),
-    ("py:class", r"torchfair\.constraints\._indexed\.IndexedModule"),  # what moves indices
-    ("py:class", r"torchfair\.projection\.(system\.Evaluation|state\.Linearised|course\.Course)"),  # parts of a state
-    ("py:class", r"torchfair\.formfinding\.job\..*\.[A-Z]"),  # type variables
-    (
-        "py:class",
-        r"torchfair\.(_names\.(Names|Sentence)|meshing\.components\.ReadSurface)",
-    ),  # parts of meshes that are read
+    ("py:class", r"(torch|abc|collections|scipy|numpy|pathlib|os)\..*"),
+    ("py:class", r"Tensor|Path|Console|Document|BackgroundServer|Ints|Floats"),  # imported for types only
+    ("py:class", r"torchfair\..*\.[A-Z]"),  # type variables
+    ("py:class|py:obj", r"(typing\.Literal|tuple|dict)\[.*"),  # what a default in a signature is cut into
 ]
 
 
@@ -54,10 +58,41 @@ def find_public_name(app, env, node, contnode):
         found = [name for name, entry in domain.objects.items() if name.endswith(ending) and not entry.aliased]
         if len(parts) >= size and len(found) == 1:
             return domain.resolve_xref(env, node["refdoc"], app.builder, node["reftype"], found[0], node, contnode)
-    return None
+    return contnode if exists(node["reftarget"]) else None
+
+
+def exists(target):
+    """Whether a class of this package has this full name: an internal one, which has no page."""
+    module, _, name = target.rpartition(".")
+    try:
+        return module.startswith("torchfair.") and hasattr(import_module(module), name)
+    except ImportError:
+        return False
+
+
+def public_names():
+    """Part, name and value of all that the parts of the package show."""
+    for part in torchfair._PARTS:
+        module = import_module(f"torchfair.{part}")
+        for name, value in vars(module).items():
+            home = getattr(value, "__module__", None) or ""
+            inside = home.startswith("torchfair.") if hasattr(module, "__path__") else home == module.__name__
+            if inside and not name.startswith("_") and not ismodule(value):
+                yield part, name, value
+
+
+def warn_of_names_without_a_page(app, env):
+    """Everything public of every part is in the reference, some of it with another part from which it comes."""
+    documented = env.get_domain("py").objects
+    for part, name, value in public_names():
+        homes = [full.rpartition(".")[0] for full in documented if full.endswith(f".{name}")]
+        modules = [sys.modules[home] for home in homes if home in sys.modules]
+        if not any(getattr(module, name, None) is value for module in modules):
+            logging.getLogger(__name__).warning("torchfair.%s.%s is public and on no page", part, name)
 
 
 def setup(app):
     app.connect("autodoc-process-docstring", mark_shapes, priority=400)  # before napoleon
     app.connect("autodoc-skip-member", skip_tuple_fields)
     app.connect("missing-reference", find_public_name)
+    app.connect("env-check-consistency", warn_of_names_without_a_page)

@@ -144,12 +144,12 @@ class FaceFrames:
 
     @cached_property
     def dual_weights(self) -> Floats:
-        """(I,) squared lengths over the areas on both sides: weights of the smoothness of fields on faces."""
+        """Squared lengths over the areas on both sides (I,), the weights of the smoothness of fields."""
         return np.asarray(3 * self.lengths**2 / self.areas[self.faces].sum(1))
 
     @cached_property
     def centres(self) -> Floats:
-        """(F, 3)."""
+        """Centres of the faces (F, 3)."""
         return np.asarray(self.points[self.triangles].mean(1))
 
 
