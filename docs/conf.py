@@ -1,10 +1,13 @@
 """Sphinx configuration: Markdown pages, the theme, and pages that need no network."""
 
+import html
 import re
 import sys
+import textwrap
 from importlib import import_module
 from inspect import ismodule
 
+from docutils import nodes
 from sphinx.util import logging
 
 import torchfair
@@ -21,6 +24,14 @@ myst_heading_anchors = 4
 exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = f"torchfair {__version__}"
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+html_js_files = ["copy.js"]
+mathjax_path = "mathjax/startup.js"  # docs/vendor_mathjax.py says where it is from
+mathjax3_config = {
+    "loader": {"load": ["input/tex", "output/chtml"]},
+    "options": {"processHtmlClass": "tex2jax_process|mathjax_process|math|output_area", "enableMenu": False},
+}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
@@ -91,8 +102,17 @@ def warn_of_names_without_a_page(app, env):
             logging.getLogger(__name__).warning("torchfair.%s.%s is public and on no page", part, name)
 
 
+def describe(app, pagename, templatename, context, doctree):
+    """The first paragraph of a page is its description, where search engines and links show one."""
+    paragraph = next(doctree.findall(nodes.paragraph), None) if doctree else None
+    if paragraph is not None:
+        words = html.escape(textwrap.shorten(paragraph.astext(), 200, placeholder=" …"), quote=True)
+        context["metatags"] = context.get("metatags", "") + f'<meta name="description" content="{words}" />\n'
+
+
 def setup(app):
     app.connect("autodoc-process-docstring", mark_shapes, priority=400)  # before napoleon
     app.connect("autodoc-skip-member", skip_tuple_fields)
     app.connect("missing-reference", find_public_name)
+    app.connect("html-page-context", describe)
     app.connect("env-check-consistency", warn_of_names_without_a_page)
