@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import json
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -98,3 +100,13 @@ def test_version_and_errors() -> None:
     for error in (torchfair.MeshError, torchfair.ShapeError, torchfair.MeshFileError):
         assert issubclass(error, torchfair.TorchfairError)
         assert issubclass(error, ValueError)
+
+
+def test_the_script_that_is_type_checked_runs() -> None:
+    runpy.run_path(str(Path(__file__).with_name("a_users_script.py")), run_name="__main__")
+
+
+def test_modules_tell_their_arguments() -> None:
+    """Their metaclass, which takes any, is not what is shown."""
+    told = inspect.signature(torchfair.NormalVariation)
+    assert list(told.parameters) == ["topology", "edge_weights", "reduction"]

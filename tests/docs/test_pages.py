@@ -1,4 +1,4 @@
-"""The built pages in Chromium without a network: formulas are set, listings are copied, nothing is wider than a phone."""
+"""The built pages in Chromium without a network: formulas are set, listings copied, nothing is wider than a phone."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor, nn
@@ -56,6 +57,12 @@ class Constraint(nn.Module):
         >>> Constraint([term])(torch.tensor([[0.0, 0, 0], [3, 0, 0]]))
         tensor(2.)
     """
+
+    if TYPE_CHECKING:  # torch says Any
+
+        def __call__(self, vertices: Tensor) -> Tensor:
+            """What ``forward`` gives."""
+            ...
 
     def __init__(self, terms: Iterable[ElementTerm] = ()) -> None:
         super().__init__()

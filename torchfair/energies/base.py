@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 from abc import ABCMeta, abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import torch
 from torch import Tensor, nn
@@ -23,6 +24,12 @@ class _MadeForTraining(ABCMeta):
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         with torch.inference_mode(False):
             return super().__call__(*args, **kwargs)
+
+    @property
+    def __signature__(cls) -> inspect.Signature:
+        """What is told of the arguments: those of ``__init__``."""
+        told = inspect.signature(cls.__init__)  # type: ignore[misc]
+        return told.replace(parameters=list(told.parameters.values())[1:], return_annotation=told.empty)
 
 
 class MeshModule(nn.Module, metaclass=_MadeForTraining):
@@ -51,6 +58,12 @@ class MeshModule(nn.Module, metaclass=_MadeForTraining):
 
     topology: Topology
     needs: ClassVar[tuple[str, ...]] = ("is_triangular", "faces_by_size")
+
+    if TYPE_CHECKING:  # torch says Any
+
+        def __call__(self, vertices: Tensor) -> Tensor:
+            """What ``forward`` gives."""
+            ...
 
     def __init__(self, topology: Topology, *, reduction: Reduction = "none") -> None:
         super().__init__()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import torch
 from torch import Tensor, nn
@@ -126,6 +126,14 @@ class ProjectionLayer(nn.Module):
         self._example = {name: torch.zeros_like(block) for name, block in blocks.items()}
         self._fixed = dict(fixed or {})
         self._problem: GuidedProjection | None = None
+
+    if TYPE_CHECKING:  # torch says Any
+
+        def __call__(
+            self, blocks: State, parameters: Mapping[str, Tensor] | None = None
+        ) -> tuple[dict[str, Tensor], LayerInfo | list[LayerInfo]]:
+            """What ``forward`` gives."""
+            ...
 
     def forward(
         self, blocks: State, parameters: Mapping[str, Tensor] | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import torch
 from torch import Tensor, nn
@@ -43,6 +43,12 @@ class Stripes(nn.Module):
         self.register_buffer("waves", _waves(directions, frequency, sharpness))
         self.sharpness = sharpness
 
+    if TYPE_CHECKING:  # torch says Any
+
+        def __call__(self, directions: Tensor) -> Tensor:
+            """What ``forward`` gives."""
+            ...
+
     def forward(self, directions: Tensor) -> Tensor:
         """Values (..., channels) at unit ``directions`` (..., 3)."""
         waves = self.waves.to(directions)
@@ -72,6 +78,12 @@ class Checker(nn.Module):
         super().__init__()
         self.register_buffer("waves", _waves(torch.eye(3) if directions is None else directions, frequency, sharpness))
         self.sharpness = sharpness
+
+    if TYPE_CHECKING:  # torch says Any
+
+        def __call__(self, directions: Tensor) -> Tensor:
+            """What ``forward`` gives."""
+            ...
 
     def forward(self, directions: Tensor) -> Tensor:
         """Values (..., 1) at unit ``directions`` (..., 3)."""
@@ -112,6 +124,12 @@ class EquirectangularImage(nn.Module):
             raise ShapeError("rotation", "(3, 3)", tuple(rotation.shape))
         self.register_buffer("image", image)
         self.register_buffer("rotation", rotation.to(torch.float64))
+
+    if TYPE_CHECKING:  # torch says Any
+
+        def __call__(self, directions: Tensor) -> Tensor:
+            """What ``forward`` gives."""
+            ...
 
     def forward(self, directions: Tensor) -> Tensor:
         """Values (..., channels) at unit ``directions`` (..., 3)."""
