@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from ..io import PolygonMesh
     from ..topology import Topology
 
-_WITH_ATTRIBUTES = (".obj", ".3dm")
 _TRIANGLES = (".stl", ".glb")
 
 
@@ -53,10 +52,10 @@ def save_result(
         polylines: Line elements of an OBJ file.
         marks: Whether line elements of the source are carried on.
     """
-    from ..io import RhinoParts, save_mesh
+    from ..io import save_mesh
+    from ..io.written_back import written_back
 
     suffix, notes = path.suffix.lower(), []
-    attributes = source.attributes
     same = topology.corners.equal(source.topology.corners) and topology.face_offsets.equal(source.topology.face_offsets)
     notes += not_held(path, source, same=same, marks=marks)
     if suffix in _TRIANGLES and not topology.is_triangular:
@@ -65,10 +64,6 @@ def save_result(
 
         notes.append(f"{path.name} holds its polygons cut into triangles: {suffix} files have no others")
         topology = Topology.from_faces(triangulate(vertices, topology).triangles, topology.num_vertices)
-    kept = attributes if same else None
-    if isinstance(attributes, RhinoParts):
-        kept = attributes if same else attributes.of_other_faces(topology.num_faces)
-    if isinstance(kept, RhinoParts) != (suffix == ".3dm") or suffix not in _WITH_ATTRIBUTES:
-        kept = None
+    kept = written_back(source.attributes, suffix, same_faces=same, count=topology.num_faces)
     save_mesh(path, vertices, topology, overwrite=force, polylines=polylines, attributes=kept)
     return notes

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..io.written_back import Attributes
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -54,6 +56,7 @@ class Document:
         choices: Likewise, words.
         names: (V,) number of each vertex in the file; None for the same numbers, or where there is no file.
         history: Commands that lead here but for those of the job itself, for the command line.
+        attributes: Groups, materials, layers and the like of the file, for these faces; they are written back.
         words: What was done last, for undo.
     """
 
@@ -70,6 +73,7 @@ class Document:
     choices: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     names: Ints | None = None
     history: tuple[Mapping[str, Any], ...] = ()
+    attributes: Attributes | None = None
     words: str = "open"
 
     @property

@@ -8,7 +8,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import MeshFileError
 from .commands import COMMANDS
 from .document import MODES, Document, Faces
+from .stored_attributes import attribute_words, stored_attributes
 
 SUFFIX = ".torchfair"
 KEPT = f".autosave{SUFFIX}"
@@ -48,6 +49,8 @@ def session_bytes(documents: Sequence[Document], now: int, camera: Mapping[str, 
     arrays: dict[int, tuple[str, Any]] = {}
     numbers: dict[int, int] = {}
     entries: list[dict[str, Any]] = []
+    files: dict[int, int] = {}
+    listed: list[dict[str, Any]] = []
 
     def stored(array: Any) -> str | None:
         if array is None:
@@ -55,6 +58,14 @@ def session_bytes(documents: Sequence[Document], now: int, camera: Mapping[str, 
         if id(array) not in arrays:
             arrays[id(array)] = f"array{len(arrays)}", array
         return arrays[id(array)][0]
+
+    def attributes(document: Document) -> int | None:
+        if document.attributes is None:
+            return None
+        if id(document.attributes) not in files:
+            files[id(document.attributes)] = len(listed)
+            listed.append(attribute_words(document.attributes, stored))
+        return files[id(document.attributes)]
 
     def entry(document: Document) -> int:
         if id(document) not in numbers:
@@ -64,12 +75,14 @@ def session_bytes(documents: Sequence[Document], now: int, camera: Mapping[str, 
                 "offsets": document.faces.offsets,
                 **{name: getattr(document, name) for name in _ARRAYS[2:]},
             }
-            entries.append(_words(document) | {"coarse": coarse} | {n: stored(a) for n, a in parts.items()})
+            words = _words(document) | {"coarse": coarse, "attributes": attributes(document)}
+            entries.append(words | {n: stored(a) for n, a in parts.items()})
             numbers[id(document)] = len(entries) - 1
         return numbers[id(document)]
 
     history = [entry(document) for document in documents]
-    head = {"torchfair": VERSION, "history": history, "now": now, "camera": camera, "documents": entries}
+    head = {"torchfair": VERSION, "history": history, "now": now, "camera": camera, "attributes": listed,
+            "documents": entries}  # fmt: skip
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:
         file.writestr("design.json", json.dumps(head, allow_nan=False))
@@ -120,12 +133,22 @@ def _read(file: zipfile.ZipFile) -> StoredSession:
         raise ValueError(f"its version is {head['torchfair']!r}, this torchfair reads {VERSION}")
     known: dict[str, Any] = {}
     documents: list[Document] = []
+    attributes: dict[int, Any] = {}
     if not 0 < len(head["documents"]) <= _MOST:
         raise ValueError("it holds no mesh")
     for entry in head["documents"]:
         arrays = {name: _array(file, entry[name], known) for name in _ARRAYS}
         coarse = None if entry["coarse"] is None else documents[_index(entry["coarse"], len(documents))]
-        documents.append(_document(entry, arrays, coarse))
+        document = _document(entry, arrays, coarse)
+        number = entry.get("attributes")  # older files have none
+        if number is not None:
+            words = head["attributes"][_index(number, len(head["attributes"]))]
+            if number not in attributes:
+                attributes[number] = stored_attributes(
+                    words, lambda name: _array(file, name, known), document.faces, document.count
+                )
+            document = replace(document, attributes=attributes[number])
+        documents.append(document)
     history = tuple(documents[_index(number, len(documents))] for number in head["history"])
     now = _index(head["now"], len(history))
     return StoredSession(history, now, _camera(head["camera"]))

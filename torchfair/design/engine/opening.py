@@ -114,6 +114,7 @@ def document_of(mesh: PolygonMesh, title: str, path: Path | None = None, repair:
         principal=marks,
         names=_names(mesh),
         history=(first,),
+        attributes=mesh.attributes,
     )
 
 

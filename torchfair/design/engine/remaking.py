@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from ...errors import MeshError
+from ...io.written_back import of_other_faces
 from ...meshing import principal_quads, principal_triangles
 from ...principal import PrincipalEdges, misalignment_of
 from ...topology import Topology
@@ -53,7 +54,8 @@ def _of_mesh(document: Document, vertices: Tensor, topology: Topology, principal
     """The document with another mesh, whose vertices have not moved yet."""
     places = vertices.numpy().copy()
     mask = None if principal is None else principal.mask.numpy().copy()
-    return replace(document, faces=faces_of(topology), start=places, vertices=places, principal=mask)
+    left = of_other_faces(document.attributes, topology.num_faces)
+    return replace(document, faces=faces_of(topology), start=places, vertices=places, principal=mask, attributes=left)
 
 
 def _carried(document: Document) -> PrincipalEdges | None:

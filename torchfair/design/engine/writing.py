@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ import torch
 
 from ...errors import MeshError
 from ...formfinding import strip_normals
-from ...io import save_mesh
+from ...io import ObjAttributes, save_mesh
+from ...io.written_back import written_back
 from ...polylines import polylines_along
 from ...principal import DevelopableStrips, developable_strips, save_strips_svg, strip_limits
 from ..containers import pack
@@ -37,7 +39,10 @@ def file_bytes(document: Document, format: str) -> bytes:
         lines = []
         if format == "obj" and document.principal is not None:
             lines = polylines_along(topology, tensor_of(document.principal))
-        save_mesh(path, tensor_of(document.vertices), topology, polylines=lines)
+        kept = written_back(document.attributes, path.suffix, same_faces=True, count=topology.num_faces)
+        if isinstance(kept, ObjAttributes):
+            kept = replace(kept, folder=Path(folder))  # where nothing is: material files keep their names
+        save_mesh(path, tensor_of(document.vertices), topology, polylines=lines, attributes=kept)
         return path.read_bytes()
 
 
