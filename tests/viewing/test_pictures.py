@@ -21,7 +21,8 @@ from torchfair.viewing import (
     picture_mesh,
     view_direction,
 )
-from torchfair.viewing.color_scale import ColorScale
+from torchfair.viewing.color_scale import BAR, ColorScale
+from torchfair.viewing.sheet import MARGIN, Sheet
 
 Mesh = tuple[torch.Tensor, Topology]
 Picture = Callable[..., tuple[int, int]]
@@ -209,3 +210,14 @@ def test_before_and_after_may_have_different_topologies(tmp_path: Path) -> None:
     picture_before_after(tmp_path / "same.png", vertices, vertices, (topology, topology), width=400)
     picture_before_after(tmp_path / "one.png", vertices, vertices, topology, width=400)
     assert (tmp_path / "same.png").read_bytes() == (tmp_path / "one.png").read_bytes()
+
+
+@pytest.mark.parametrize("label", [r"$\ell\,|\alpha|$", r"$|\kappa_1| + |\kappa_2|$", "planarity of the panels"])
+def test_the_title_of_a_bar_stays_beside_the_pictures(label: str) -> None:
+    sheet = Sheet(800, 600)
+    ColorScale.of(torch.rand(50), label, color_map="Blues").draw_bar(sheet, 560)
+    pixels = sheet.pixels()
+    inked = np.flatnonzero((pixels < 200).any(2).any(0))
+    assert inked.min() >= 800 - MARGIN - BAR
+    assert inked.max() < 800
+    assert inked.min() < 800 - MARGIN - BAR + 44 + 13, "it has a title"

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.colors import ListedColormap
 
 BAR = 150  # room for the colour bar, in pixels
+_LEFT, _WIDE = 44, 26  # of it beside the bar, and of the bar
+_CLEAR = 4  # between pictures and the title of the bar
 
 
 @dataclass(frozen=True)
@@ -66,9 +68,12 @@ class ColorScale:
         top = (
             sheet.top + CAPTION + (body - CAPTION - height) // 2 + 0.25
         )  # not on the edge of a pixel, where rounding decides
-        axes = sheet.axes(sheet.width - MARGIN - BAR + 44, top, 26, height)
+        axes = sheet.axes(sheet.width - MARGIN - BAR + _LEFT, top, _WIDE, height)
         scale = ScalarMappable(Normalize(0, self.limit), self._table())
         bar = sheet.figure.colorbar(scale, cax=axes, extend="max" if self.clipped else "neither", extendfrac=0.04)
         bar.outline.set_linewidth(points(1))
         bar.ax.tick_params(labelsize=points(19), width=points(1), length=points(5))
-        bar.ax.set_title(self.label, fontsize=points(26), pad=points(16))
+        title = bar.ax.set_title(self.label, fontsize=points(26), pad=points(16))
+        room = 2 * (_LEFT + _WIDE / 2 - _CLEAR)  # around the middle of the bar: pictures would cover the rest
+        wide = title.get_window_extent().width
+        title.set_fontsize(points(26) * min(1.0, room / wide))
