@@ -131,3 +131,29 @@ def test_feet_are_sought_anew_when_a_state_is_changed_in_place() -> None:
 
 def test_no_vertices_no_term() -> None:
     assert constraints.gliding_terms(feet_of(0), weight=1.0) == []
+
+
+def test_the_last_three_states_are_not_searched_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    feet, asked = feet_of(4), []
+    search = SplineCurves.closest
+
+    def closest(self: SplineCurves, points: Tensor, curves: Tensor) -> object:
+        asked.append(points)
+        return search(self, points, curves)
+
+    monkeypatch.setattr(SplineCurves, "closest", closest)
+    a, b, c, d = ({"vertices": scattered(0.1, 4, seed)} for seed in range(4))
+    for state, searches in ((a, 1), (a, 1), (b, 2), (c, 3), (a, 3), (d, 4), (a, 4), (c, 4), (b, 5), (a, 5)):
+        found = feet(state)
+        assert len(asked) == searches
+        torch.testing.assert_close(found.positions, feet_of(4)(state).positions, rtol=0, atol=0)
+        del asked[searches:]
+    a["vertices"] += 0.01  # in place
+    moved = feet(a).positions
+    assert len(asked) == 6
+    torch.testing.assert_close(moved, feet_of(4)({"vertices": a["vertices"].clone()}).positions, rtol=0, atol=0)
+    tracked = {"vertices": a["vertices"].clone().requires_grad_()}
+    feet(tracked)
+    feet(tracked)
+    assert all(not points.requires_grad for points, *_ in feet._kept)
+    assert len(feet._kept) == 3

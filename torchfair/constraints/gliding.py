@@ -13,12 +13,14 @@ from ..projection.layout import State
 from ._indexed import IndexedModule
 from .base import Constraint
 
+_KEPT = 3  # queries: a step looks at where it is and where it leads in turns
+
 
 class CurveFeet(IndexedModule):
     """Closest points on their own curves of some vertices of a state.
 
-    They are constant for derivatives. The last query is kept, since several terms ask for the same state; not that for
-    a tensor that requires gradients, which would keep its graph.
+    They are constant for derivatives. The last three queries are kept, since several terms and guards ask for the same
+    states; not those for tensors that require gradients, which would keep their graphs.
 
     Args:
         curves: Reference curves.
@@ -32,8 +34,7 @@ class CurveFeet(IndexedModule):
     ) -> None:
         super().__init__(vertices, curve_of_vertex)
         self.curves, self.block = curves, block
-        self._asked: tuple[Tensor, int] | None = None
-        self._answer: SplineFeet | None = None
+        self._kept: list[tuple[Tensor, int, SplineFeet]] = []
 
     @property
     def vertices(self) -> Tensor:
@@ -58,15 +59,20 @@ class CurveFeet(IndexedModule):
     def forward(self, state: State) -> SplineFeet:
         """Feet (n, ...) for the vertices of the state."""
         points = state[self.block]
-        if self._answer is None or not self._is_last(points):
-            self._answer = self.curves.closest(points[self.vertices], self.curve_of_vertex)
-            untracked = not points.is_inference() and not points.requires_grad
-            self._asked = (points, points._version) if untracked else None
-        return self._answer
+        if points.is_inference() or points.requires_grad:
+            return self._found(points)
+        others, answer = [], None
+        for kept in self._kept:  # comparing values would wait for other devices
+            if kept[0] is not points:
+                others.append(kept)
+            elif kept[1] == points._version:
+                answer = kept[2]
+        answer = answer or self._found(points)
+        self._kept = [(points, points._version, answer), *others[: _KEPT - 1]]
+        return answer
 
-    def _is_last(self, points: Tensor) -> bool:
-        """Whether these are the very points asked for last; comparing their values would wait for other devices."""
-        return self._asked is not None and points is self._asked[0] and points._version == self._asked[1]
+    def _found(self, points: Tensor) -> SplineFeet:
+        return self.curves.closest(points[self.vertices], self.curve_of_vertex)
 
 
 def offset_from_curve(x: Tensor, foot: Tensor, tangent: Tensor) -> Tensor:
