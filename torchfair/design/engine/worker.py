@@ -25,7 +25,7 @@ from .remaking import remade
 from .sliders import settings_message
 from .writing import file_bytes, strips_message
 
-_BETWEEN_NUMBERS = 0.1  # seconds
+_BETWEEN_NUMBERS = 0.2  # seconds
 _BETWEEN_FRAMES = 1.0 / 40.0
 _PAUSE = 0.15  # seconds without a move of the mouse, after which a large mesh takes a step
 _FAULTS = (TorchfairError, OSError, RuntimeError, ValueError, IndexError, MemoryError)
