@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..io.written_back import Attributes
+if TYPE_CHECKING:
+    from ..io.written_back import Attributes
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

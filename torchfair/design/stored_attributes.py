@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..io import ObjAttributes, RhinoParts
-from ..io.obj_attributes import KEPT
-from ..io.written_back import Attributes
 from .document import Faces
+
+if TYPE_CHECKING:
+    from ..io.written_back import Attributes
 
 _TEXTURE = (b"vt",)
 
 
 def attribute_words(attributes: Attributes, stored: Callable[[Any], str | None]) -> dict[str, Any]:
     """What JSON holds of them; ``stored`` puts an array into the file, and names it."""
+    from ..io import RhinoParts  # here, since the server does not wait for torch
+
     if isinstance(attributes, RhinoParts):
         return {"unit": attributes.unit, "objects": list(map(list, attributes.objects)),
                 "owners": stored(attributes.owners)}  # fmt: skip
@@ -40,6 +42,9 @@ def stored_attributes(
         ValueError: they are none of a mesh with these faces and so many vertices, or hold other lines than those of
             attributes.
     """
+    from ..io import ObjAttributes, RhinoParts
+    from ..io.obj_attributes import KEPT
+
     count = len(faces.offsets) - 1
     if "unit" in words:
         objects = tuple((str(name), str(layer)) for name, layer in words["objects"])

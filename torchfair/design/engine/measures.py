@@ -31,7 +31,7 @@ def edge_bytes(vertices: Tensor, topology: Topology) -> tuple[Array, float]:
 
 
 def live_numbers(vertices: Tensor, topology: Topology, handles: Mapping[int, Any], worst: int) -> dict[str, Any]:
-    """What is measured five times a second while the mesh moves; lengths in the unit of the vertices, angles in degrees."""
+    """What is measured while the mesh moves; lengths in the unit of the vertices, angles in degrees."""
     energy = float(normal_variation(vertices, topology))
     curvature = float(total_absolute_curvature(vertices, topology))
     polygons = topology.face_sizes > 3
