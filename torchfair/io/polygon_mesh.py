@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from .._names import FROM_ZERO, Names
+from .._short_repr import short_repr
 from ..topology import Topology
 from .obj_attributes import ObjAttributes
 from .rhino_parts import RhinoParts
@@ -38,6 +39,8 @@ class PolygonMesh:
     names: Names = FROM_ZERO
     vertex_map: Tensor | None = None
     attributes: ObjAttributes | RhinoParts | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         self.topology.check_vertices(self.vertices)

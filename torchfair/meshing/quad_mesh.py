@@ -7,6 +7,7 @@ from typing import Any
 
 from torch import Tensor
 
+from .._short_repr import short_repr
 from ..topology import Topology
 from .components import ReadSurface
 from .mesh_creases import MeshCreases
@@ -35,3 +36,5 @@ class QuadMesh:
     creases: MeshCreases
     report: dict[str, Any]
     notes: list[str] = field(default_factory=list)
+
+    __repr__ = short_repr

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from torch import Tensor
 
+from .._short_repr import short_repr
+
 if TYPE_CHECKING:
     from .state import ProjectionState
 
@@ -137,6 +139,8 @@ class ProjectionResult:
     history: list[IterationRecord]
     solver: str
     timings: dict[str, float]
+
+    __repr__ = short_repr
 
     @property
     def merit(self) -> float:

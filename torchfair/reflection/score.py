@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from .._short_repr import short_repr
 from ..cameras.camera import Camera, Size, height_and_width
 from ..geometry import face_areas
 from ..geometry._ops import norm
@@ -60,6 +61,8 @@ class ReflectionScore:
     reference_coverage: Tensor
     window: Tensor
     setup: ReflectionSetup
+
+    __repr__ = short_repr
 
     def numbers(self) -> dict[str, Tensor | Size]:
         """What a report holds: the four numbers, those of every view, and what was looked at, without the pictures."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from .._names import Sentence
+from .._short_repr import short_repr
 from ..topology import Topology
 
 
@@ -34,6 +35,8 @@ class RepairedMesh:
     vertex_map: Tensor
     flipped_faces: Tensor
     sentences: tuple[Sentence, ...]
+
+    __repr__ = short_repr
 
     @property
     def messages(self) -> list[str]:

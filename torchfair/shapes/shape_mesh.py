@@ -13,6 +13,7 @@ from torch import Tensor
 from torchfair.errors import MeshError
 from torchfair.topology import Topology
 
+from .._short_repr import short_repr
 from ._checks import is_integer_from
 from .surface import Surface
 
@@ -36,6 +37,8 @@ class ShapeMesh:
     topology: Topology
     parameters: Tensor
     surface: Surface
+
+    __repr__ = short_repr
 
     @property
     def normals(self) -> Tensor:

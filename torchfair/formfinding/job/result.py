@@ -7,8 +7,10 @@ from typing import Generic, TypeVar
 
 from torch import Tensor
 
+from ..._short_repr import short_repr
 from ...projection import ProjectionResult
 from ...topology import Topology
+from .notebook import result_html
 from .promises import Promise
 
 
@@ -31,6 +33,8 @@ class Level:
     after: dict[str, float]
     runs: list[ProjectionResult]
     promises: list[Promise]
+
+    __repr__ = short_repr
 
     @property
     def steps(self) -> int:
@@ -61,6 +65,20 @@ class JobResult(Generic[L]):
     levels: list[L]
     notes: list[str]
     stopped: bool
+
+    def __repr__(self) -> str:
+        kept, all_of_them = sum(promise.holds for promise in self.promises), len(self.promises)
+        before, after = self.before.get("normal_variation"), self.after.get("normal_variation")
+        energy = "" if before is None or after is None else f"E {before:.5g} -> {after:.5g}, "
+        return (
+            f"{type(self).__name__}({self.topology.num_vertices} vertices, {self.topology.num_faces} faces, {energy}"
+            f"{kept} of {all_of_them} promises kept, {self.steps} steps, {self.seconds:.3g} s"
+            f"{', stopped' * self.stopped})"
+        )
+
+    def _repr_html_(self) -> str:
+        """Figures and a picture, for notebooks."""
+        return result_html(self)
 
     @property
     def vertices(self) -> Tensor:
