@@ -6,7 +6,11 @@ import sys
 import textwrap
 from importlib import import_module
 from inspect import ismodule
+from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+import gallery
 from docutils import nodes
 from sphinx.util import logging
 
@@ -110,9 +114,16 @@ def describe(app, pagename, templatename, context, doctree):
         context["metatags"] = context.get("metatags", "") + f'<meta name="description" content="{words}" />\n'
 
 
+def fill_gallery(app, docname, source):
+    """Puts the experiments into their page."""
+    if docname == "gallery":
+        source[0] = source[0].replace("<!-- entries -->", gallery.page())
+
+
 def setup(app):
     app.connect("autodoc-process-docstring", mark_shapes, priority=400)  # before napoleon
     app.connect("autodoc-skip-member", skip_tuple_fields)
     app.connect("missing-reference", find_public_name)
     app.connect("html-page-context", describe)
+    app.connect("source-read", fill_gallery)
     app.connect("env-check-consistency", warn_of_names_without_a_page)

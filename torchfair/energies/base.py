@@ -28,7 +28,10 @@ class _MadeForTraining(ABCMeta):
     @property
     def __signature__(cls) -> inspect.Signature:
         """What is told of the arguments: those of ``__init__``."""
-        told = inspect.signature(cls.__init__)  # type: ignore[misc]
+        try:
+            told = inspect.signature(cls.__init__, eval_str=True)  # type: ignore[misc]
+        except NameError:  # a subclass with types that are there for type checkers only
+            told = inspect.signature(cls.__init__)  # type: ignore[misc]
         return told.replace(parameters=list(told.parameters.values())[1:], return_annotation=told.empty)
 
 
