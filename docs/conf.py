@@ -10,12 +10,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-import gallery  # noqa: E402
-from docutils import nodes  # noqa: E402
-from sphinx.util import logging  # noqa: E402
+import gallery
+from docutils import nodes
+from sphinx.util import logging
 
-import torchfair  # noqa: E402
-from torchfair import __version__  # noqa: E402
+import torchfair
+from torchfair import __version__
 
 project = "torchfair"
 author = "The torchfair developers"
