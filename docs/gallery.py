@@ -78,19 +78,23 @@ def page() -> str:
     return "\n\n".join(parts)
 
 
-def main() -> None:
-    """Makes the small pictures."""
+def shrink(source: Path, target: Path) -> int:
+    """Writes a small copy of a picture and returns its size in bytes."""
     from PIL import Image
 
+    picture = Image.open(source).convert("RGB")
+    picture.thumbnail((WIDTH, WIDTH), Image.Resampling.LANCZOS)
+    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
+    return target.stat().st_size
+
+
+def main() -> None:
+    """Makes the small pictures."""
     IMAGES.mkdir(exist_ok=True)
     for name, file in PICTURES.items():
         source = Path(sys.argv[1]) / name / file
         if source.exists():
-            picture = Image.open(source).convert("RGB")
-            picture.thumbnail((WIDTH, WIDTH), Image.Resampling.LANCZOS)
-            small = picture.quantize(COLOURS, dither=Image.Dither.NONE)
-            small.save(IMAGES / f"{name}.png", optimize=True)
-            print(name, picture.size, (IMAGES / f"{name}.png").stat().st_size)
+            print(name, shrink(source, IMAGES / f"{name}.png"))
 
 
 if __name__ == "__main__":
