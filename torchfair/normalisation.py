@@ -41,9 +41,9 @@ class Normalisation:
         return cls(0.5 * (used.amin(0) + used.amax(0)), length)
 
     def apply(self, points: Tensor) -> Tensor:
-        """Input units to dimensionless."""
+        """Points (..., 3) in input units to dimensionless ones."""
         return (points - self.centre) / self.length
 
     def invert(self, points: Tensor) -> Tensor:
-        """Dimensionless to input units."""
+        """Dimensionless points (..., 3) to input units."""
         return points * self.length + self.centre

@@ -85,7 +85,7 @@ def mesh_polylines(topology: Topology, *, corners: Tensor | None = None) -> list
 
     Args:
         topology: any polygon mesh.
-        corners: as for :func:`straight_triples`.
+        corners: (n,) as for :func:`straight_triples`.
 
     Returns:
         Vertex numbers, one int64 tensor of two or more for each polyline, on the device of ``topology``.

@@ -47,9 +47,9 @@ class Topology:
         corner_edges: (H,) edge from a corner to the next corner of its face.
         edges: (E, 2) vertices ``v, w`` of every edge.
         interior_edge_faces: (I, 2) left and right face of the interior edges.
-        ring_vertices, ring_offsets: neighbours of each vertex, counterclockwise; around a boundary vertex
-            from the boundary edge with the surface on its left to the other one.
-        loop_vertices, loop_offsets: boundary loops with the surface on the left.
+        ring_vertices, ring_offsets: (R,) and (V+1,) neighbours of each vertex, counterclockwise; around a boundary
+            vertex from the boundary edge with the surface on its left to the other one.
+        loop_vertices, loop_offsets: (B,) and (L+1,), boundary loops with the surface on the left.
     """
 
     num_vertices: int

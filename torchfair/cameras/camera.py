@@ -147,7 +147,7 @@ class Camera(ABC):
 
     @final
     def directions_at(self, pixels: Tensor, size: Size, view: Tensor | None = None) -> Tensor:
-        """Unit directions ``(views, *any, 3)`` from the eye through places ``(views, *any, 2)`` of the picture.
+        """Unit directions ``(views, *any, 3)`` from the eye through ``pixels`` ``(views, *any, 2)`` of the picture.
 
         With ``view`` (N,), the number of the view of each place: (N, 3) at places (N, 2).
         """
@@ -187,7 +187,10 @@ class Camera(ABC):
 
     @final
     def weights_in_space(self, weights: Tensor, depths: Tensor) -> Tensor:
-        """Weights of corners in space, up to a common factor, from those in the picture and depths of the corners."""
+        """Weights of corners in space, up to a common factor.
+
+        They follow from ``weights`` (..., 3) in the picture and ``depths`` (..., 3) of the corners.
+        """
         return weights * -depths if self.central else weights  # depth is -1 / distance
 
     @property

@@ -16,8 +16,8 @@ def barrier(margin: Tensor, safe: Tensor) -> Tensor:
     no finite merit, so damped steps never cross it.
 
     Args:
-        margin: Distance from the bound, in any unit; differentiable.
-        safe: Margin from which on the barrier is silent, positive, same unit.
+        margin: (...) distance from the bound, in any unit; differentiable.
+        safe: (...) margin from which on the barrier is silent, positive, same unit.
     """
     softening = _SOFTENING * safe
     inside = torch.where(margin < 0.0, torch.zeros_like(margin), margin)

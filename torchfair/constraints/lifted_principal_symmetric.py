@@ -21,7 +21,10 @@ LARGEST_RADIUS = 1e3  # mean edge lengths
 
 
 def lifted_principal_symmetric_blocks(vertices: Tensor, edges: Tensor, stars: PrincipalStars) -> State:
-    """Centres (R, 3), unit normals of the planes of edges (n, 3) and slacks (R, 2) that fit ``vertices``."""
+    """Centres (R, 3), unit normals of the planes (n, 3) of edges, and slacks (R, 2).
+
+    They fit ``vertices`` (V, 3) at all stars and ``edges`` (n, 2).
+    """
     spheres = star_spheres(vertices, stars)
     bent = torch.where(spheres.curvatures < 0, -1.0, 1.0) * spheres.curvatures.abs().clamp_min(1.0 / LARGEST_RADIUS)
     outward = spheres.normals / bent[:, None]

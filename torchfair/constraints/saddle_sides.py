@@ -126,7 +126,8 @@ class SaddleSides:
     ) -> Tensor:
         """By how much stars ``x`` (n, 7, 3) miss what they are to be, (n, 8), in curvatures of the star.
 
-        Negative where they are; what does not matter is zero.
+        Negative where they are; what does not matter is zero. ``is_saddle``, ``per_curvature`` and ``per_excess``
+        (n,) say what each star is to be, and in which unit.
         """
         beyond, spheres = side_curvatures(x)
         margin = share * self.margin
@@ -137,7 +138,7 @@ class SaddleSides:
         return torch.cat([is_saddle[:, None] * saddle, ((1.0 - is_saddle) * excess)[:, None]], dim=1)
 
     def lacking_derivative(self, x: Tensor, is_saddle: Tensor, per_curvature: Tensor, per_excess: Tensor) -> Tensor:
-        """Jacobians (n, 8, 21) of :meth:`lacking`."""
+        """Jacobians (n, 8, 21) of :meth:`lacking`, with the same arguments as for that."""
         sides, spheres = side_curvatures_derivative(x)
         saddle = torch.cat([sides, -spheres[:, None]], dim=1) * (is_saddle * per_curvature)[:, None, None, None]
         other = ((1.0 - is_saddle) * per_excess)[:, None, None] * angle_excess_derivative(x)

@@ -52,7 +52,7 @@ class System(Protocol):
         ...
 
     def preconditioner(self, damping: Tensor) -> Tensor:
-        """A sparse approximate inverse of ``A + diag(damping)``, such as that of its diagonal blocks."""
+        """A sparse approximate inverse (N, N) of ``A + diag(damping)``, such as that of its diagonal blocks."""
         ...
 
 

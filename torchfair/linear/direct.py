@@ -50,7 +50,7 @@ class SparseDirect(ABC):
         """
 
     def assemble(self, system: System, damping: Tensor) -> np.ndarray:
-        """Lower triangle of the damped matrix, in double precision."""
+        """Values of the lower triangle of the matrix damped by (N,), in double precision."""
         values = system.lower_values.cpu().numpy().astype(np.float64)
         values[system.pattern.lower.diagonal] += damping.cpu().numpy()
         if not math.isfinite(values.sum()):

@@ -81,7 +81,7 @@ class MatrixSystem:
         return result
 
     def preconditioner(self, damping: Tensor) -> Tensor:
-        """Inverse of the diagonal, as a sparse matrix."""
+        """Inverse of the diagonal, as a sparse matrix (N, N)."""
         diagonal = torch.from_numpy(self._matrix.diagonal()).to(damping) + damping
         every = torch.arange(self.num_unknowns + 1, device=damping.device)
         return csr_matrix(every, every[:-1], 1.0 / diagonal, self._matrix.shape)

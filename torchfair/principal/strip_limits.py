@@ -30,7 +30,7 @@ class StripLimits(NamedTuple):
 def strip_limits(vertices: Tensor, polylines: Sequence[Tensor], normals: Tensor) -> StripLimits:
     """How high and how deep strips can be: where rulings on neighbouring vertices meet, about a radius of curvature.
 
-    Args and errors are those of :func:`developable_strips`. Both are 0 if a normal lies along an edge.
+    Arguments and errors are those of :func:`developable_strips`. Both are 0 if a normal lies along an edge.
     """
     height, depth = _limits(prepare(vertices, polylines, normals)).T
     return StripLimits(float(height.min(initial=math.inf)), float(depth.min(initial=math.inf)))

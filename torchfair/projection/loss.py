@@ -41,11 +41,11 @@ class Squares:
     """Least squares, ``|r|^2 / 2``."""
 
     def value(self, residuals: Tensor) -> Tensor:
-        """Half the squared norm."""
+        """Half the squared norm (n,) of residuals (n, m)."""
         return 0.5 * residuals.square().sum(1)
 
     def root(self, residuals: Tensor) -> Tensor:
-        """One."""
+        """One (n,) for each of residuals (n, m)."""
         return residuals.new_ones(residuals.shape[0])
 
 
@@ -75,12 +75,12 @@ class SmoothAbsolute(Rounded):
     """
 
     def value(self, residuals: Tensor) -> Tensor:
-        """``sqrt(|r|^2 + epsilon^2) - epsilon``, evaluated without cancellation."""
+        """``sqrt(|r|^2 + epsilon^2) - epsilon`` (n,) of residuals (n, m), evaluated without cancellation."""
         squared = residuals.square().sum(1)
         return squared / (torch.sqrt(squared + self.epsilon**2) + self.epsilon)
 
     def root(self, residuals: Tensor) -> Tensor:
-        """``(|r|^2 + epsilon^2)^(-1/4)``."""
+        """``(|r|^2 + epsilon^2)^(-1/4)`` (n,) of residuals (n, m)."""
         return torch.rsqrt(torch.sqrt(residuals.square().sum(1) + self.epsilon**2))
 
 
@@ -100,12 +100,12 @@ class LogAbsolute(Rounded):
     """
 
     def value(self, residuals: Tensor) -> Tensor:
-        """``|r| - epsilon log(1 + |r| / epsilon)``, never below zero."""
+        """``|r| - epsilon log(1 + |r| / epsilon)`` (n,) of residuals (n, m), never below zero."""
         sizes: Tensor = torch.linalg.vector_norm(residuals, dim=1)
         return (sizes - self.epsilon * torch.log1p(sizes / self.epsilon)).clamp_min(0.0)
 
     def root(self, residuals: Tensor) -> Tensor:
-        """``(|r| + epsilon)^(-1/2)``."""
+        """``(|r| + epsilon)^(-1/2)`` (n,) of residuals (n, m)."""
         sizes: Tensor = torch.linalg.vector_norm(residuals, dim=1)
         return torch.rsqrt(sizes + self.epsilon)
 
@@ -121,11 +121,11 @@ class OneSided:
     one_sided: ClassVar[bool] = True
 
     def value(self, residuals: Tensor) -> Tensor:
-        """Half the squared norm of the components above zero."""
+        """Half the squared norm (n,) of the components of residuals (n, m) above zero."""
         return 0.5 * residuals.clamp_min(0.0).square().sum(1)
 
     def root(self, residuals: Tensor) -> Tensor:
-        """One, for the components that are heeded."""
+        """One, for the components of residuals (n, m) that are heeded."""
         return residuals.new_ones(residuals.shape[0])
 
 

@@ -54,7 +54,7 @@ class ProjectionState:
         linearised: There.
         settings: Tolerances and damping.
         courses: Merit, damping and status of each member of a batch; one for a single problem.
-        heeded: Inequalities that the last step took for equations.
+        heeded: (k,) inequalities that the last step took for equations.
     """
 
     evaluation: Evaluation

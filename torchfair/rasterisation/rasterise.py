@@ -96,7 +96,8 @@ def visible_triangles(
 def interpolate(points: Tensor, triangles: Tensor, face_index: Tensor) -> tuple[Tensor, Tensor]:
     """Barycentric weights ``(height, width, 3)`` and depth ``(height, width)`` of the triangles in ``face_index``.
 
-    Differentiable with respect to ``points`` with ``face_index`` held fixed.
+    Differentiable with respect to ``points`` (V, 3), in pixels and depth, with ``triangles`` (T, 3) and ``face_index``
+    (height, width) held fixed.
     """
     height, width = face_index.shape
     table = _affine_tables(points, triangles)

@@ -115,7 +115,7 @@ class ReflectionSetup:
         return self._render(vertices, topology, antialias=antialias)
 
     def smooth(self, vertices: Tensor, topology: Topology, normals: Tensor | None = None) -> Pictures:
-        """Pictures of a mesh (*batch, V, 3) that mirrors with blended normals, by default its vertex normals."""
+        """Pictures of ``vertices`` (*batch, V, 3) that mirror with ``normals`` (*batch, V, 3), their own by default."""
         return self._render(vertices, topology, shading="smooth", normals=normals)
 
     def _render(self, vertices: Tensor, topology: Topology, **shading: Any) -> Pictures:
@@ -147,7 +147,7 @@ class ReflectionSetup:
             return self.smooth(self.reference.vertices, self.reference.topology, self.reference.normals)
 
     def pictures_to_match(self, vertices: Tensor, topology: Topology) -> Pictures:
-        """What a mesh is compared with: the reference, or the mesh itself shaded by its vertex normals."""
+        """What a mesh (*batch, V, 3) is compared with: the reference, or itself shaded by its vertex normals."""
         if self.reference is None:
             return self.smooth(vertices, topology)
         return Pictures(*(picture.to(vertices) for picture in self.reference_pictures))

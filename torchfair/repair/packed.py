@@ -25,7 +25,7 @@ from .welding import checked_tolerance, weld_tolerance, welded
 def repair_packed(
     vertices: Tensor, corners: Ints, offsets: Ints, *, weld: bool | float = False, split_edges: bool = False
 ) -> RepairedMesh:
-    """:func:`repair_mesh` for packed faces."""
+    """:func:`repair_mesh` of vertices (*batch, V, 3) for packed faces."""
     soup = _soup(vertices, corners, offsets)
     soup = without_repeated_corners(soup)
     tolerance = weld_tolerance(soup) if weld is False else checked_tolerance(weld, soup)
@@ -54,7 +54,7 @@ def repair_packed(
 
 
 def weld_packed(vertices: Tensor, corners: Ints, offsets: Ints, weld: bool | float) -> RepairedMesh:
-    """Seams closed and nothing else; vertices that were not merged into others stay, used or not."""
+    """Seams closed and nothing else; vertices (*batch, V, 3) that were not merged into others stay, used or not."""
     soup = _soup(vertices, corners, offsets)
     soup = welded(soup, checked_tolerance(weld, soup), split_edges=False)
     kept = np.ones(len(soup.points), bool)

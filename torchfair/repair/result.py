@@ -23,7 +23,7 @@ class RepairedMesh:
         kept_corners: (H',) old number of each corner (counted face after face); -1 for a corner that was put in.
         vertex_map: (V,) new number of each old vertex: where it was merged into another one, that of the other; -1
             where it was dropped. Of a vertex that was split, the copy that its first face uses.
-        flipped_faces: old numbers of the faces that were turned over.
+        flipped_faces: (n,) old numbers of the faces that were turned over.
         sentences: what was done, with the places in old numbers.
     """
 

@@ -45,7 +45,7 @@ class Revolution(Surface):
 
     @abstractmethod
     def profile(self, v: Tensor) -> tuple[Tensor, Tensor]:
-        """Distance from the axis and height."""
+        """Distance from the axis and height, each as ``v`` (...)."""
 
     @abstractmethod
     def _line_integrals(self, v0: float, v1: float) -> tuple[float, float]:
@@ -105,7 +105,7 @@ class Torus(Revolution):
         return (is_full_turn(self.angles), is_full_turn(self.tube_angles))
 
     def profile(self, v: Tensor) -> tuple[Tensor, Tensor]:
-        """Distance from the axis and height."""
+        """Distance from the axis and height, each as ``v`` (...)."""
         return self.major_radius + self.minor_radius * v.cos(), self.minor_radius * v.sin()
 
     def _line_integrals(self, v0: float, v1: float) -> tuple[float, float]:
@@ -136,7 +136,7 @@ class Cone(Revolution):
         return (0.0, self.height)
 
     def profile(self, v: Tensor) -> tuple[Tensor, Tensor]:
-        """Distance from the axis and height."""
+        """Distance from the axis and height, each as ``v`` (...)."""
         return self.bottom_radius + (self.top_radius - self.bottom_radius) / self.height * v, v
 
     def _line_integrals(self, v0: float, v1: float) -> tuple[float, float]:
@@ -160,7 +160,7 @@ class Cylinder(Revolution):
         return (0.0, self.height)
 
     def profile(self, v: Tensor) -> tuple[Tensor, Tensor]:
-        """Distance from the axis and height."""
+        """Distance from the axis and height, each as ``v`` (...)."""
         return torch.full_like(v, self.radius), v
 
     def _line_integrals(self, v0: float, v1: float) -> tuple[float, float]:
@@ -185,7 +185,7 @@ class Catenoid(Revolution):
         return self.heights
 
     def profile(self, v: Tensor) -> tuple[Tensor, Tensor]:
-        """Distance from the axis and height."""
+        """Distance from the axis and height, each as ``v`` (...)."""
         return self.waist * (v / self.waist).cosh(), v
 
     def _line_integrals(self, v0: float, v1: float) -> tuple[float, float]:
@@ -216,7 +216,7 @@ class Hyperboloid(Revolution):
         return (math.asinh(low / self.steepness), math.asinh(high / self.steepness))
 
     def profile(self, v: Tensor) -> tuple[Tensor, Tensor]:
-        """Distance from the axis and height."""
+        """Distance from the axis and height, each as ``v`` (...)."""
         return self.waist * v.cosh(), self.steepness * v.sinh()
 
     def _line_integrals(self, v0: float, v1: float) -> tuple[float, float]:

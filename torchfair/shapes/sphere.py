@@ -46,7 +46,7 @@ class Sphere(Revolution):
         return (south + math.pi / 2 < 1e-9, math.pi / 2 - north < 1e-9)
 
     def profile(self, v: Tensor) -> tuple[Tensor, Tensor]:
-        """Distance from the axis and height."""
+        """Distance from the axis and height, each as ``v`` (...)."""
         return self.radius * v.cos(), self.radius * v.sin()
 
     def normal(self, u: Tensor, v: Tensor) -> Tensor:

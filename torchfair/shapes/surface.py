@@ -62,24 +62,27 @@ class Surface(ABC):
     # ---- first order -----------------------------------------------------------------------------------
 
     def position(self, u: Tensor, v: Tensor) -> Tensor:
-        """Points ``(..., 3)``."""
+        """Points ``(..., 3)`` at parameters ``u`` and ``v`` (...), which broadcast."""
         return self._position(*_forms.broadcast(u, v))
 
     def tangents(self, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor]:
-        """Partial derivatives ``x_u, x_v`` ``(..., 3)``, not unit."""
+        """Partial derivatives ``x_u, x_v`` ``(..., 3)``, not unit, at parameters ``u`` and ``v`` (...)."""
         return _forms.tangents(self._position, *_forms.broadcast(u, v))
 
     def normal(self, u: Tensor, v: Tensor) -> Tensor:
-        """Unit normals ``(..., 3)`` along ``x_u`` cross ``x_v``."""
+        """Unit normals ``(..., 3)`` along ``x_u`` cross ``x_v``, at parameters ``u`` and ``v`` (...)."""
         return _forms.unit(torch.linalg.cross(*self.tangents(u, v)))
 
     def frame(self, u: Tensor, v: Tensor) -> Tensor:
-        """Orthonormal tangent vectors ``(..., 2, 3)``: along the u-line, and 90 degrees to its left."""
+        """Orthonormal tangent vectors ``(..., 2, 3)`` at parameters ``u`` and ``v`` (...).
+
+        The first is along the u-line, the second 90 degrees to its left.
+        """
         along = _forms.unit(self.tangents(u, v)[0])
         return torch.stack([along, torch.linalg.cross(self.normal(u, v), along)], dim=-2)
 
     def area_element(self, u: Tensor, v: Tensor) -> Tensor:
-        """Area per unit of ``du dv``, ``(...)``."""
+        """Area per unit of ``du dv``, ``(...)``, at parameters ``u`` and ``v`` (...)."""
         area: Tensor = torch.linalg.vector_norm(torch.linalg.cross(*self.tangents(u, v)), dim=-1)
         return area
 
@@ -90,7 +93,7 @@ class Surface(ABC):
         return _forms.partials(self._position, u, v)
 
     def fundamental_forms(self, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor]:
-        """Both fundamental forms, ``(..., 3)`` each.
+        """Both fundamental forms, ``(..., 3)`` each, at parameters ``u`` and ``v`` (...).
 
         The first is ``x_u.x_u, x_u.x_v, x_v.x_v``, the second ``n_u.x_u, n_u.x_v, n_v.x_v``: positive where
         the surface is convex.
@@ -98,20 +101,28 @@ class Surface(ABC):
         return _forms.fundamental_forms(self._partials(*_forms.broadcast(u, v)))
 
     def shape_operator(self, u: Tensor, v: Tensor) -> _forms.ShapeOperator:
-        """Entries ``uu, uv, vv`` (each ``(...)``) of the shape operator in the :meth:`frame`."""
+        """Entries ``uu, uv, vv`` (each ``(...)``) of the shape operator.
+
+        They are those in the :meth:`frame` at parameters ``u`` and ``v`` (...).
+        """
         return _forms.shape_operator(*self.fundamental_forms(u, v))
 
     def line_curvatures(self, u: Tensor, v: Tensor) -> Tensor:
-        """Normal curvatures ``(..., 2)`` of the u-line and of the v-line, signed as the principal ones."""
+        """Normal curvatures ``(..., 2)`` of both lines at parameters ``u`` and ``v`` (...).
+
+        The u-line comes first; signed as the principal ones.
+        """
         first, second = self.fundamental_forms(u, v)
         return second[..., ::2] / first[..., ::2]
 
     def principal_curvatures(self, u: Tensor, v: Tensor) -> Tensor:
-        """Principal curvatures ``(..., 2)``, signed, ``k1 >= k2``."""
+        """Principal curvatures ``(..., 2)``, signed, ``k1 >= k2``, at parameters ``u`` and ``v`` (...)."""
         return _forms.eigenvalues(self.shape_operator(u, v))
 
     def principal_directions(self, u: Tensor, v: Tensor) -> Tensor:
-        """Unit principal directions ``(..., 2, 3)`` in the order of :meth:`principal_curvatures`.
+        """Unit principal directions ``(..., 2, 3)`` at parameters ``u`` and ``v`` (...).
+
+        In the order of :meth:`principal_curvatures`.
 
         ``d1, d2, n`` is right-handed; the common sign of ``d1, d2`` has no meaning. At umbilics, where every
         direction is principal, ``d1`` is the direction of the u-line.
@@ -122,7 +133,7 @@ class Surface(ABC):
         return torch.stack([cos * along + sin * left, cos * left - sin * along], dim=-2)
 
     def gaussian_curvature(self, u: Tensor, v: Tensor) -> Tensor:
-        """Gaussian curvature ``K = k1 k2``, ``(...)``."""
+        """Gaussian curvature ``K = k1 k2``, ``(...)``, at parameters ``u`` and ``v`` (...)."""
         s = self.shape_operator(u, v)
         return s.uu * s.vv - s.uv**2
 

@@ -47,7 +47,7 @@ def saddle_defects(arms: Tensor, sides: Tensor, normals: Tensor, margin: float =
 
 
 def saddle_penalty_per_vertex(vertices: Tensor, topology: Topology, saddles: Tensor | None = None) -> Tensor:
-    """Terms (*batch, V) of :func:`saddle_penalty`; zero at vertices that need not be saddles."""
+    """Terms (*batch, V), zero at vertices that need not be saddles; see :func:`saddle_penalty`."""
     return _per_vertex(vertices, topology, saddle_groups(topology, saddles))
 
 

@@ -77,7 +77,7 @@ class FormRecipe(Recipe[FormSettings]):
         self.problem.settings = settings
 
     def check_pulls(self, vertices: Tensor, targets: Tensor) -> None:
-        """Refuses handles on a boundary that stays, away from where they are."""
+        """Refuses handles ``vertices`` (n,) on a boundary that stays, with ``targets`` (n, 3) elsewhere."""
         refuse_unreachable_handles(vertices, targets, self.given, self.stays())
 
     def plan(self, state: State) -> Plan:

@@ -158,7 +158,7 @@ class Recipe(ABC, Generic[S]):
         """Called once a mesh was put elsewhere, for bounds that it does not keep there: it may come back to them."""
 
     def check_pulls(self, vertices: Tensor, targets: Tensor) -> None:
-        """Refuses handles (n,) with targets (n, 3), in the unit of the input, that cannot be reached."""
+        """Refuses handles ``vertices`` (n,) whose ``targets`` (n, 3), in the unit of the input, cannot be reached."""
 
     # ---- what comes of it ------------------------------------------------------------------------------
 

@@ -30,7 +30,7 @@ class SymmetricDesign:
         fixed: (V,) bool, vertices that do not move.
         reference: Surface to stay close to: vertices and topology of a mesh, or a function that gives closest points
             and unit normals (:func:`torchfair.geometry.closest_on`).
-        on: Vertices where conditions are imposed, by default all regular ones.
+        on: (n,) vertices where conditions are imposed, by default all regular ones.
         settings: Weights and tolerances.
 
     Attributes:

@@ -43,7 +43,7 @@ def condition_residuals(vertices: Tensor, principal: PrincipalEdges, stars: Prin
 def symmetric_measures(
     vertices: Tensor, principal: PrincipalEdges, stars: PrincipalStars, handles: Tensor, targets: Tensor
 ) -> dict[str, float]:
-    """Measures of success of a mesh (V, 3), in the unit of the input.
+    """Measures of success of ``vertices`` (V, 3) with ``handles`` (n,) at ``targets`` (n, 3), in the unit of the input.
 
     Returns:
         ``largest_cospherical``, ``mean_cospherical``, ``largest_coplanar``, ``mean_coplanar``: see

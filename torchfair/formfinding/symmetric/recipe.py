@@ -222,8 +222,8 @@ def principal_symmetric(
         fixed: (V,) bool, vertices that keep their places.
         reference: Surface to stay close to: vertices and topology of a mesh, or a function that gives closest points
             and unit normals (:func:`torchfair.geometry.closest_on`).
-        on: Vertices where conditions are imposed, such as those of some principal polylines (paper Fig. 14h); by
-            default all regular ones. With ``settings.energy_weight`` E is lowered everywhere else.
+        on: (n,) vertices where conditions are imposed, such as those of some principal polylines (paper Fig. 14h);
+            by default all regular ones. With ``settings.energy_weight`` E is lowered everywhere else.
         levels: How often to refine by Loop subdivision; the labels are carried along.
         settings: Weights and tolerances.
         callback: Called with every iteration record; returning True stops. Ctrl-C, or a function that raises
