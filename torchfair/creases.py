@@ -41,6 +41,7 @@ def crease_edges(vertices: Tensor, topology: Topology, crease_angle: float) -> T
         SettingsError: if ``crease_angle`` is not between 0 and pi.
 
     Example:
+        >>> from torchfair.creases import crease_edges
         >>> import math, torch
         >>> from torchfair import Topology
         >>> tent = torch.tensor([[0.0, 0, 0], [0, 1, 0], [1, 0, 1], [-1, 0, 1]])
@@ -106,6 +107,7 @@ def crease_chains(topology: Topology, edges: Tensor, corners: Tensor) -> list[Cr
         ShapeError: if ``corners`` is not a bool tensor (V,), or two edges do not meet at a vertex that is no corner.
 
     Example:
+        >>> from torchfair.creases import crease_chains, crease_corners, crease_edges
         >>> import math, torch
         >>> from torchfair import Topology
         >>> tent = torch.tensor([[0.0, 0, 0], [0, 1, 0], [1, 0, 1], [-1, 0, 1]])

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import doctest
 import importlib
 import inspect
 import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import pytest
+
 import torchfair
+from torchfair.constraints import Constraint
+from torchfair.energies import MeshModule
 
 FIRST = r"\*batch|\.\.\.|\d*[A-Z]\w*'?(?: ?[+*-] ?\w+)?(?: of the file)?|[a-z]|\d+|channels|size|height|views|blocks"
 SHAPE = re.compile(rf"\((?:\.\.\.|(?:{FIRST}) ?,[^()]*)\)|any shape|one number")
@@ -72,3 +77,59 @@ def test_the_check_of_shapes_sees_what_is_missing() -> None:
 
     assert without_shape(area, "Areas of the faces, all of them (as told).") == ["weights"]
     assert without_shape(area, "Areas (F,) of the faces.") == []
+
+
+# ---- examples -------------------------------------------------------------------------------------------
+
+FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+FINDER = doctest.DocTestFinder(recurse=False)
+BASES = {"EdgeEnergy", "MeshModule", "StarEnergy"}
+DOCUMENTED = {id(value): (name, value) for name, value in public(lambda value: bool(getattr(value, "__doc__", "")))}
+
+
+def methods(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """A public thing, and what it has."""
+    yield name, value
+    if inspect.isclass(value):
+        for key, method in vars(value).items():
+            if not key.startswith("_"):
+                yield f"{name}.{key}", method
+
+
+EXAMPLES = [
+    pytest.param(test, id=name)
+    for told in DOCUMENTED.values()
+    if inspect.isfunction(told[1]) or inspect.isclass(told[1])
+    for name, value in methods(*told)
+    for test in FINDER.find(value, name, module=False, globs={})
+    if test.examples
+]
+
+
+def needs_example(name: str, value: Any) -> bool:
+    """Whether something is an energy, a quantity, a constraint or a job."""
+    part, _, own = name.partition(".")
+    if inspect.isclass(value):
+        return issubclass(value, MeshModule | Constraint) and own not in BASES and part != "reflection"
+    return (
+        inspect.isfunction(value) and part in ("energies", "geometry", "formfinding", "meshing") and own not in INSIDE
+    )
+
+
+INSIDE = {
+    *("boundary_extrapolation", "closest_on", "job_report", "measure_mesh_on", "solved", "symmetric_measures"),
+}
+"""Functions that serve those who write jobs or energies, and have words for it on their pages."""
+
+
+@pytest.mark.parametrize("test", EXAMPLES)
+def test_examples_of_docstrings_give_what_they_say(test: doctest.DocTest) -> None:
+    said: list[str] = []
+    failed = doctest.DocTestRunner(optionflags=FLAGS).run(test, out=said.append).failed
+    assert not failed, "".join(said)
+
+
+def test_everything_that_somebody_starts_from_has_an_example() -> None:
+    asked = {name: value for name, value in DOCUMENTED.values() if needs_example(name, value)}
+    assert len(asked) > 90
+    assert sorted(name for name, value in asked.items() if ">>>" not in value.__doc__) == []

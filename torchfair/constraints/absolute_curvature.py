@@ -60,6 +60,15 @@ class SmoothAbsoluteCurvature(Constraint):
 
     Raises:
         MeshError: a face is not a triangle.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import SmoothAbsoluteCurvature
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> constraint = SmoothAbsoluteCurvature(mesh.topology, smoothing=0.01)
+        >>> constraint(mesh.vertices)
+        tensor(20.2399, dtype=torch.float64)
     """
 
     def __init__(self, topology: Topology, *, smoothing: float) -> None:

@@ -63,6 +63,16 @@ class BoundaryBending(Constraint):
         topology: Triangle mesh.
         normals: (V, 3) prescribed unit normals at boundary vertices, zero where none is.
         smoothing: Length below which ``l sin a`` counts as flat, above 0.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import BoundaryBending
+        >>> from torchfair.geometry import vertex_normals
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> constraint = BoundaryBending(mesh.topology, vertex_normals(mesh.vertices, mesh.topology), smoothing=0.01)
+        >>> constraint(mesh.vertices)
+        tensor(0.9147, dtype=torch.float64)
     """
 
     def __init__(self, topology: Topology, normals: Tensor, *, smoothing: float) -> None:

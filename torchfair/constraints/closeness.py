@@ -155,6 +155,18 @@ class Closeness(Constraint):
         reference: The surface, a mesh or a function (:func:`torchfair.geometry.closest_on`). It is part of the module
             and not of its ``state_dict``.
         vertices: (n,) numbers of the vertices that are to be near it.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import Closeness
+        >>> from torchfair.geometry import ReferenceSurface
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> every = torch.arange(len(mesh.vertices))
+        >>> moved = mesh.vertices + 0.01 * torch.sin(40 * mesh.vertices)
+        >>> constraint = Closeness(ReferenceSurface(mesh.vertices, mesh.topology), every)
+        >>> constraint(moved)
+        tensor(0.0044, dtype=torch.float64)
     """
 
     def __init__(self, reference: Reference, vertices: Tensor) -> None:
@@ -170,6 +182,17 @@ class DistanceLimit(Constraint):
     Args:
         reference: The surface, as for :class:`Closeness`.
         limits: (V,) largest distances, above 0; in the state as ``parts.0.refresh.limits``.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import DistanceLimit
+        >>> from torchfair.geometry import ReferenceSurface
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> limits = torch.full((len(mesh.vertices),), 0.1).double()
+        >>> constraint = DistanceLimit(ReferenceSurface(mesh.vertices, mesh.topology), limits)
+        >>> constraint(mesh.vertices)
+        tensor(0., dtype=torch.float64)
     """
 
     def __init__(self, reference: Reference, limits: Tensor) -> None:

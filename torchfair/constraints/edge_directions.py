@@ -60,6 +60,16 @@ class EdgeDirections(Constraint):
 
         keeps = EdgeDirections(vertices, topology)
         loss = NormalVariation(topology)(moved) + 30.0 * keeps(moved)
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import EdgeDirections
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> moved = mesh.vertices + 0.01 * torch.sin(40 * mesh.vertices)
+        >>> constraint = EdgeDirections(mesh.vertices, mesh.topology)
+        >>> constraint(moved)
+        tensor(0.0089, dtype=torch.float64)
     """
 
     def __init__(self, vertices: Tensor, topology: Topology, edges: Tensor | None = None) -> None:

@@ -119,6 +119,15 @@ class CornerAngles(Constraint):
         topology: Any polygon mesh.
         smallest: Bound in radians.
         safe: (H,) angle of each corner from which on the barrier is silent, in radians, above ``smallest``.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import CornerAngles
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> constraint = CornerAngles(mesh.topology, 0.1, torch.full((len(mesh.topology.corners),), 0.2).double())
+        >>> constraint(mesh.vertices)
+        tensor(0., dtype=torch.float64)
     """
 
     def __init__(self, topology: Topology, smallest: float, safe: Tensor) -> None:
@@ -136,6 +145,16 @@ class FaceAreas(Constraint):
         areas: (F,) what shares are of, above 0.
         smallest: Share that no face goes below.
         safe: Share from which on the barrier is silent.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import FaceAreas
+        >>> from torchfair.geometry import face_areas
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> constraint = FaceAreas(mesh.topology, face_areas(mesh.vertices, mesh.topology))
+        >>> constraint(mesh.vertices)
+        tensor(0., dtype=torch.float64)
     """
 
     def __init__(self, topology: Topology, areas: Tensor, *, smallest: float = 0.2, safe: float = 0.5) -> None:

@@ -114,6 +114,18 @@ class Cospherical(Constraint):
 
     Args:
         stars: Regular vertices.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import Cospherical
+        >>> from torchfair.principal import principal_edges_of_lattice
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> edges = principal_edges_of_lattice(mesh)
+        >>> stars = edges.stars()
+        >>> constraint = Cospherical(stars)
+        >>> constraint(mesh.vertices) < 1e-12
+        tensor(True)
     """
 
     def __init__(self, stars: PrincipalStars) -> None:
@@ -132,6 +144,18 @@ class Coplanar(Constraint):
 
     Raises:
         ShapeError: an end of an edge is no star.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import Coplanar, between_stars
+        >>> from torchfair.principal import principal_edges_of_lattice
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> edges = principal_edges_of_lattice(mesh)
+        >>> stars = edges.stars()
+        >>> constraint = Coplanar(between_stars(edges.topology.edges[edges.mask], stars), stars)
+        >>> constraint(mesh.vertices) < 1e-12
+        tensor(True)
     """
 
     def __init__(self, edges: Tensor, stars: PrincipalStars) -> None:

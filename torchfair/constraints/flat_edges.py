@@ -46,6 +46,16 @@ class FlatEdges(Constraint):
     Args:
         topology: Any polygon mesh.
         edges: (n,) numbers of interior edges.
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.constraints import FlatEdges
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> constraint = FlatEdges(topology, torch.tensor([0]))
+        >>> constraint(vertices)
+        tensor(1.6000)
     """
 
     def __init__(self, topology: Topology, edges: Tensor) -> None:

@@ -134,6 +134,19 @@ class Gliding(Constraint):
         curves: Reference curves; part of the module, not of its ``state_dict``.
         vertices: (n,) numbers of the vertices.
         curve_of_vertex: (n,) on which of the curves each is to be.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import Gliding
+        >>> from torchfair.geometry import SplineCurves
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> loop = mesh.topology.loop_vertices[: mesh.topology.loop_offsets[1]]
+        >>> rim = SplineCurves([mesh.vertices[loop]], [True])
+        >>> moved = mesh.vertices + 0.01 * torch.sin(40 * mesh.vertices)
+        >>> constraint = Gliding(rim, loop, torch.zeros(len(loop), dtype=torch.int64))
+        >>> constraint(moved)
+        tensor(0.0006, dtype=torch.float64)
     """
 
     def __init__(self, curves: SplineCurves, vertices: Tensor, curve_of_vertex: Tensor) -> None:

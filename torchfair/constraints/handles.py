@@ -31,6 +31,15 @@ class Handles(Constraint):
     Args:
         vertices: (n,) numbers.
         targets: (n, 3) places. In the state as ``parts.0.target``; gradients flow to them if they require them.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import Handles
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> constraint = Handles(torch.tensor([5]), mesh.vertices[[5]] + torch.tensor([0.0, 0.0, 0.2]))
+        >>> constraint(mesh.vertices)
+        tensor(0.0200, dtype=torch.float64)
     """
 
     def __init__(self, vertices: Tensor, targets: Tensor) -> None:

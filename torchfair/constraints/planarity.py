@@ -81,6 +81,7 @@ class Planarity(Constraint):
         faces: (n,) numbers of faces, by default all.
 
     Example:
+        >>> from torchfair.constraints import Planarity
         >>> import torch
         >>> from torchfair import Topology
         >>> quad = torch.tensor([[0.0, 0, 0], [1, 0, 2], [1, 1, 0], [0, 1, 2]], requires_grad=True)

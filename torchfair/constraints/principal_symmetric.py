@@ -154,6 +154,18 @@ class EvenStars(Constraint):
 
     Args:
         stars: Regular vertices.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import EvenStars
+        >>> from torchfair.principal import principal_edges_of_lattice
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> edges = principal_edges_of_lattice(mesh)
+        >>> stars = edges.stars()
+        >>> constraint = EvenStars(stars)
+        >>> constraint(mesh.vertices) < 1e-12
+        tensor(True)
     """
 
     def __init__(self, stars: PrincipalStars) -> None:

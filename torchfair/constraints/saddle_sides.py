@@ -184,6 +184,18 @@ class SaddleShape(Constraint):
         stars: Regular vertices.
         vertices: (V, 3) where it is decided.
         margin: As of :class:`SaddleSides`.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import SaddleShape
+        >>> from torchfair.principal import principal_edges_of_lattice
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> edges = principal_edges_of_lattice(mesh)
+        >>> stars = edges.stars()
+        >>> constraint = SaddleShape(stars, mesh.vertices)
+        >>> constraint(mesh.vertices)
+        tensor(0., dtype=torch.float64)
     """
 
     def __init__(self, stars: PrincipalStars, vertices: Tensor, *, margin: float = 0.05) -> None:

@@ -108,6 +108,15 @@ class NormalPyramids(Constraint):
 
     Args:
         topology: Any polygon mesh.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import NormalPyramids
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> constraint = NormalPyramids(mesh.topology)
+        >>> constraint(mesh.vertices)
+        tensor(0., dtype=torch.float64)
     """
 
     def __init__(self, topology: Topology) -> None:
@@ -125,6 +134,15 @@ class GoodSaddles(Constraint):
         topology: Any polygon mesh.
         saddles: (V,) bool, inner vertices with 4 to 16 edges.
         margin: As of :func:`saddle_terms`.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import GoodSaddles
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> constraint = GoodSaddles(mesh.vertices, mesh.topology, ~mesh.topology.is_boundary_vertex)
+        >>> constraint(mesh.vertices)
+        tensor(0., dtype=torch.float64)
     """
 
     def __init__(self, vertices: Tensor, topology: Topology, saddles: Tensor, *, margin: float = 0.0) -> None:

@@ -163,6 +163,16 @@ class TangentStars(Constraint):
         topology: Triangle mesh.
         vertices: (n,) numbers of boundary vertices.
         normals: (n, 3) unit normals of stars, see :class:`BoundaryNormals`.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import TangentStars
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> rim = torch.nonzero(mesh.topology.is_boundary_vertex).squeeze(1)
+        >>> constraint = TangentStars(mesh.topology, rim, mesh.normals[rim])
+        >>> constraint(mesh.vertices)
+        tensor(0.1750, dtype=torch.float64)
     """
 
     def __init__(self, topology: Topology, vertices: Tensor, normals: Tensor) -> None:
@@ -179,6 +189,16 @@ class TangentPatches(Constraint):
         topology: Triangle mesh.
         chosen: (n,) numbers of boundary vertices.
         normals: (n, 3) unit normals of the surface.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.constraints import TangentPatches
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> rim = torch.nonzero(mesh.topology.is_boundary_vertex).squeeze(1)
+        >>> constraint = TangentPatches(mesh.vertices, mesh.topology, rim, mesh.normals[rim])
+        >>> constraint(mesh.vertices)
+        tensor(4.5993e-05, dtype=torch.float64)
     """
 
     def __init__(self, vertices: Tensor, topology: Topology, chosen: Tensor, normals: Tensor) -> None:

@@ -25,6 +25,13 @@ def angle_variation_per_edge(vertices: Tensor, topology: Topology, edge_weights:
     """Terms ``l |a|`` of E' for every interior edge, times its weight: (*batch, I).
 
     Arguments, degenerate cases and errors as for :func:`angle_variation`.
+
+    Example:
+        >>> from torchfair.energies import angle_variation_per_edge
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> angle_variation_per_edge(mesh.vertices, mesh.topology).shape
+        torch.Size([240])
     """
     return weigh(lengths_times_angles(vertices, topology).abs(), edge_weights, topology)
 
@@ -50,13 +57,32 @@ def angle_variation(vertices: Tensor, topology: Topology, edge_weights: Tensor |
 
     Raises:
         ShapeError: if ``vertices`` or ``edge_weights`` has the wrong shape or is not floating.
+
+    Example:
+        >>> from torchfair.energies import angle_variation
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> angle_variation(mesh.vertices, mesh.topology)
+        tensor(23.4003, dtype=torch.float64)
     """
     return angle_variation_per_edge(vertices, topology, edge_weights).sum(-1)
 
 
 @safe_to_load
 class AngleVariation(EdgeEnergy):
-    """Module form of :func:`angle_variation`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
+    """Module form of :func:`angle_variation`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,).
+
+    Example:
+        >>> from torchfair.energies import AngleVariation
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> energy = AngleVariation(mesh.topology)
+        >>> energy(mesh.vertices)
+        tensor(23.4003, dtype=torch.float64)
+        >>> batch = mesh.vertices.expand(3, -1, -1)
+        >>> energy(batch).shape
+        torch.Size([3])
+    """
 
     def per_edge(self, vertices: Tensor) -> Tensor:
         """Terms (*batch, I), weights included; see :func:`angle_variation_per_edge`."""

@@ -50,6 +50,17 @@ def normal_variation_derivative(
 
     Raises:
         ShapeError: if ``vertices``, ``velocity`` or ``edge_weights`` has the wrong shape or is not floating.
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.energies import normal_variation_derivative
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> velocity = torch.zeros_like(vertices)
+        >>> velocity[2:4, 2] = 1.0  # raise the ridge
+        >>> normal_variation_derivative(vertices, velocity, topology) > 0
+        tensor(True)
     """
     topology.check_vertices(vertices)
     if not isinstance(velocity, Tensor) or velocity.shape[-2:] != vertices.shape[-2:]:

@@ -45,6 +45,7 @@ def normal_variation_tangential_gradient(
         ShapeError: if ``vertices``, ``normals`` or ``edge_weights`` has the wrong shape or is not floating.
 
     Example:
+        >>> from torchfair.energies import normal_variation_tangential_gradient
         >>> from torchfair.shapes import icosphere
         >>> sphere = icosphere(0)  # an icosahedron: every star has more symmetry than needed
         >>> part = normal_variation_tangential_gradient(sphere.vertices, sphere.vertices, sphere.topology)

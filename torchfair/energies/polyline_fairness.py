@@ -19,6 +19,13 @@ def polyline_fairness_per_triple(vertices: Tensor, topology: Topology, triples: 
     """Squared second difference of every triple: (*batch, N).
 
     Arguments and errors as for :func:`polyline_fairness`.
+
+    Example:
+        >>> from torchfair.energies import polyline_fairness_per_triple
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> polyline_fairness_per_triple(mesh.vertices, mesh.topology).shape
+        torch.Size([256])
     """
     topology.check_vertices(vertices)
     if triples is None:
@@ -44,6 +51,13 @@ def polyline_fairness(vertices: Tensor, topology: Topology, triples: Tensor | No
 
     Raises:
         ShapeError: if ``vertices`` or ``triples`` has the wrong shape or dtype.
+
+    Example:
+        >>> from torchfair.energies import polyline_fairness
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> polyline_fairness(mesh.vertices, mesh.topology)
+        tensor(5.6819, dtype=torch.float64)
     """
     return polyline_fairness_per_triple(vertices, topology, triples).sum(-1)
 
@@ -64,6 +78,17 @@ class PolylineFairness(MeshModule):
     Raises:
         ShapeError: if ``triples`` is not an integer tensor (N, 3).
         MeshError: if a triple uses a vertex that the topology does not have.
+
+    Example:
+        >>> from torchfair.energies import PolylineFairness
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> energy = PolylineFairness(mesh.topology)
+        >>> energy(mesh.vertices)
+        tensor(5.6819, dtype=torch.float64)
+        >>> batch = mesh.vertices.expand(3, -1, -1)
+        >>> energy(batch).shape
+        torch.Size([3])
     """
 
     def __init__(self, topology: Topology, triples: Tensor | None = None, *, reduction: Reduction = "none") -> None:

@@ -23,6 +23,13 @@ def total_absolute_curvature_per_vertex(
     """``|k1| + |k2|`` of every star, integrated over it: (*batch, V).
 
     Arguments, degenerate cases and errors as for :func:`total_absolute_curvature`.
+
+    Example:
+        >>> from torchfair.energies import total_absolute_curvature_per_vertex
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> total_absolute_curvature_per_vertex(mesh.vertices, mesh.topology).shape
+        torch.Size([144])
     """
     return star_terms(nuclear_norms, vertices, topology, sine=sine, estimator=estimator, boundary=boundary)
 
@@ -72,6 +79,13 @@ def total_absolute_curvature(
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
         TorchfairError: for an unknown estimator or treatment of the boundary.
+
+    Example:
+        >>> from torchfair.energies import total_absolute_curvature
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> total_absolute_curvature(mesh.vertices, mesh.topology)
+        tensor(22.4440, dtype=torch.float64)
     """
     terms = total_absolute_curvature_per_vertex(vertices, topology, sine=sine, estimator=estimator, boundary=boundary)
     return terms.sum(-1)
@@ -79,6 +93,18 @@ def total_absolute_curvature(
 
 @safe_to_load
 class TotalAbsoluteCurvature(StarEnergy):
-    """Module form of :func:`total_absolute_curvature`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
+    """Module form of :func:`total_absolute_curvature`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,).
+
+    Example:
+        >>> from torchfair.energies import TotalAbsoluteCurvature
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> energy = TotalAbsoluteCurvature(mesh.topology)
+        >>> energy(mesh.vertices)
+        tensor(22.4440, dtype=torch.float64)
+        >>> batch = mesh.vertices.expand(3, -1, -1)
+        >>> energy(batch).shape
+        torch.Size([3])
+    """
 
     norms = staticmethod(nuclear_norms)

@@ -14,6 +14,13 @@ def total_mean_curvature_per_edge(vertices: Tensor, topology: Topology, edge_wei
     """Terms ``l a / 2`` of the total mean curvature for every interior edge, times its weight: (*batch, I).
 
     Arguments, degenerate cases and errors as for :func:`total_mean_curvature`.
+
+    Example:
+        >>> from torchfair.energies import total_mean_curvature_per_edge
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> total_mean_curvature_per_edge(mesh.vertices, mesh.topology).shape
+        torch.Size([240])
     """
     return weigh(lengths_times_angles(vertices, topology) / 2, edge_weights, topology)
 
@@ -37,13 +44,32 @@ def total_mean_curvature(vertices: Tensor, topology: Topology, edge_weights: Ten
 
     Raises:
         ShapeError: if ``vertices`` or ``edge_weights`` has the wrong shape or is not floating.
+
+    Example:
+        >>> from torchfair.energies import total_mean_curvature
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> total_mean_curvature(ball.vertices, ball.topology)  # nearly 8 pi, that of the sphere of radius 2
+        tensor(24.9744, dtype=torch.float64)
     """
     return total_mean_curvature_per_edge(vertices, topology, edge_weights).sum(-1)
 
 
 @safe_to_load
 class TotalMeanCurvature(EdgeEnergy):
-    """Module form of :func:`total_mean_curvature`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
+    """Module form of :func:`total_mean_curvature`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,).
+
+    Example:
+        >>> from torchfair.energies import TotalMeanCurvature
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> energy = TotalMeanCurvature(ball.topology)
+        >>> energy(ball.vertices)  # nearly 8 pi, that of the sphere of radius 2
+        tensor(24.9744, dtype=torch.float64)
+        >>> batch = ball.vertices.expand(3, -1, -1)
+        >>> energy(batch).shape
+        torch.Size([3])
+    """
 
     def per_edge(self, vertices: Tensor) -> Tensor:
         """Terms (*batch, I), weights included; see :func:`total_mean_curvature_per_edge`."""

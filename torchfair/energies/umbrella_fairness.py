@@ -16,6 +16,13 @@ def umbrella_fairness_per_vertex(vertices: Tensor, topology: Topology) -> Tensor
     """Squared length of the umbrella vector of every vertex, 0 at boundary and isolated vertices: (*batch, V).
 
     Arguments and errors as for :func:`umbrella_fairness`.
+
+    Example:
+        >>> from torchfair.energies import umbrella_fairness_per_vertex
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> umbrella_fairness_per_vertex(mesh.vertices, mesh.topology).shape
+        torch.Size([144])
     """
     return umbrella_vectors(vertices, topology).square().sum(-1)
 
@@ -38,13 +45,32 @@ def umbrella_fairness(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.energies import umbrella_fairness
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> umbrella_fairness(mesh.vertices, mesh.topology)
+        tensor(0.0721, dtype=torch.float64)
     """
     return umbrella_fairness_per_vertex(vertices, topology).sum(-1)
 
 
 @safe_to_load
 class UmbrellaFairness(MeshModule):
-    """Module form of :func:`umbrella_fairness`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
+    """Module form of :func:`umbrella_fairness`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,).
+
+    Example:
+        >>> from torchfair.energies import UmbrellaFairness
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> energy = UmbrellaFairness(mesh.topology)
+        >>> energy(mesh.vertices)
+        tensor(0.0721, dtype=torch.float64)
+        >>> batch = mesh.vertices.expand(3, -1, -1)
+        >>> energy(batch).shape
+        torch.Size([3])
+    """
 
     needs: ClassVar[tuple[str, ...]] = ("is_boundary_vertex", "valences")
 

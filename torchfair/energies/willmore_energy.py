@@ -30,6 +30,13 @@ def willmore_energy_per_vertex(
     """The squared curvature of every star, integrated over it: (*batch, V).
 
     Arguments, degenerate cases and errors as for :func:`willmore_energy`.
+
+    Example:
+        >>> from torchfair.energies import willmore_energy_per_vertex
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> willmore_energy_per_vertex(mesh.vertices, mesh.topology).shape
+        torch.Size([144])
     """
     return star_terms(
         _squares(density), vertices, topology, sine=sine, estimator=estimator, boundary=boundary, per_area=True
@@ -85,6 +92,8 @@ def willmore_energy(
         TorchfairError: for an unknown density, estimator or treatment of the boundary.
 
     Example:
+        >>> import torch
+        >>> from torchfair.energies import willmore_energy
         >>> from torchfair.shapes import icosphere
         >>> sphere = icosphere(3)
         >>> round(willmore_energy(sphere.vertices, sphere.topology).item() / torch.pi, 1)
@@ -110,6 +119,17 @@ class WillmoreEnergy(StarEnergy):
 
     Raises:
         TorchfairError: for an unknown density, estimator or treatment of the boundary.
+
+    Example:
+        >>> from torchfair.energies import WillmoreEnergy
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> energy = WillmoreEnergy(ball.topology)
+        >>> energy(ball.vertices)  # nearly 4 pi, that of every sphere
+        tensor(11.9746, dtype=torch.float64)
+        >>> batch = ball.vertices.expand(3, -1, -1)
+        >>> energy(batch).shape
+        torch.Size([3])
     """
 
     per_area = True

@@ -32,6 +32,15 @@ def corner_angles(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import corner_angles
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> torch.rad2deg(corner_angles(vertices, topology))[:4]  # of the first panel
+        tensor([90., 90., 90., 90.])
     """
     topology.check_vertices(vertices)
     points = gather(vertices, topology.corners)
@@ -65,6 +74,13 @@ def angle_defects(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import angle_defects
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> angle_defects(ball.vertices, ball.topology).sum()  # 4 pi, that of every sphere
+        tensor(12.5664, dtype=torch.float64)
     """
     angles = corner_angles(vertices, topology)
     total = scatter_sum(angles[..., None], topology.corners, topology.num_vertices).squeeze(-1)

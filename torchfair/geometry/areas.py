@@ -31,6 +31,16 @@ def face_area_vectors(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import face_area_vectors
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> face_area_vectors(vertices, topology)
+        tensor([[ 0., -2.,  4.],
+                [ 0.,  2.,  4.]])
     """
     topology.check_vertices(vertices)
     return map_faces(vertices, topology, area_vector)
@@ -52,6 +62,15 @@ def face_areas(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import face_areas
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> face_areas(vertices, topology)
+        tensor([4.4721, 4.4721])
     """
     return norm(face_area_vectors(vertices, topology))
 

@@ -46,6 +46,14 @@ def balanced_normals(vertices: Tensor, topology: Topology, *, sweeps: int = 4) -
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import balanced_normals
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> normals = balanced_normals(ball.vertices, ball.topology)
+        >>> (normals - ball.normals).norm(dim=1).max() < 0.02
+        tensor(True)
     """
     normals = vertex_normals(vertices, topology)
     star = _Edges.of(vertices, topology)

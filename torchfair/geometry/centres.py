@@ -21,6 +21,16 @@ def face_centres(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import face_centres
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> face_centres(vertices, topology)
+        tensor([[1.0000, 1.0000, 0.5000],
+                [1.0000, 3.0000, 0.5000]])
     """
     topology.check_vertices(vertices)
     sums = vertices.new_zeros(*vertices.shape[:-2], topology.num_faces, 3)

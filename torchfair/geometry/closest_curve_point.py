@@ -118,6 +118,7 @@ class ReferenceCurve:
         closed: whether a segment joins the last point to the first.
 
     Example:
+        >>> from torchfair.geometry import ReferenceCurve
         >>> import torch
         >>> corner = ReferenceCurve(torch.tensor([[0.0, 0, 0], [4, 0, 0], [4, 3, 0]]), closed=False)
         >>> corner.closest(torch.tensor([[1.0, 2, 0], [9, 1, 0]])).distances

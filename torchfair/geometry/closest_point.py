@@ -83,6 +83,7 @@ class ReferenceSurface:
         MeshError: if there is no face, or a coordinate is not finite or beyond 1e70.
 
     Example:
+        >>> from torchfair.geometry import ReferenceSurface
         >>> import torch
         >>> from torchfair import Topology
         >>> square = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])

@@ -47,6 +47,14 @@ def corrected_shape_operators(vertices: Tensor, topology: Topology, normals: Ten
 
     Raises:
         ShapeError: if ``vertices`` or ``normals`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import corrected_shape_operators
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> operators = corrected_shape_operators(ball.vertices, ball.topology)
+        >>> operators.shape  # integrals over the stars
+        torch.Size([162, 3, 3])
     """
     topology.check_vertices(vertices)
     if normals is None:

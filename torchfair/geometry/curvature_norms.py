@@ -21,6 +21,12 @@ def nuclear_norms(matrices: Tensor) -> Tensor:
         (...) >= 0, homogeneous of degree 1. Convex, with kinks where an eigenvalue is zero: the derivative
         there is a subgradient, half of either side's, and zero for the zero matrix. Smooth at umbilics
         (a = d, b = 0) that are not flat.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.geometry import nuclear_norms
+        >>> nuclear_norms(torch.diag(torch.tensor([3.0, -4.0, 0.0])))
+        tensor(7.)
     """
     a, b, d = _entries(matrices)
     return torch.maximum((a + d).abs(), norm(torch.stack([a - d, 2 * b], dim=-1)))
@@ -35,6 +41,12 @@ def frobenius_norms(matrices: Tensor) -> Tensor:
     Returns:
         (...) >= 0, homogeneous of degree 1. Smooth but for the zero matrix, where all derivatives are 0 (a
         subgradient).
+
+    Example:
+        >>> import torch
+        >>> from torchfair.geometry import frobenius_norms
+        >>> frobenius_norms(torch.diag(torch.tensor([3.0, -4.0, 0.0])))
+        tensor(5.)
     """
     a, b, d = _entries(matrices)
     return norm(torch.stack([a, 2**0.5 * b, d], dim=-1))

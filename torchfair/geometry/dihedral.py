@@ -41,6 +41,15 @@ def dihedral_angles(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import dihedral_angles
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> torch.rad2deg(dihedral_angles(vertices, topology))  # convex: the ridge is an edge of a roof
+        tensor([53.1301])
     """
     edges = edge_vectors(vertices, topology)[..., : topology.num_interior_edges, :]
     left, right, valid = adjacent_normals(vertices, topology)

@@ -29,6 +29,15 @@ def dual_edge_lengths(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import dual_edge_lengths
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> dual_edge_lengths(vertices, topology)  # between the two unit normals
+        tensor([0.8944])
     """
     left, right, valid = adjacent_normals(vertices, topology)
     return norm(torch.where(valid[..., None], left - right, 0.0))

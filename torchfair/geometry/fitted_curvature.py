@@ -130,6 +130,14 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3), or patches are of another mesh.
         SettingsError: if ``rings`` is no number from 2 on.
         TorchfairError: if ``rings`` are to be chosen inside ``torch.func.vmap``.
+
+    Example:
+        >>> from torchfair.geometry import fitted_curvature
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> fit = fitted_curvature(ball.vertices, ball.topology)
+        >>> fit.operators.shape
+        torch.Size([162, 3, 3])
     """
     topology.check_vertices(vertices)
     if rings is None:
@@ -164,6 +172,13 @@ def rings_for_noise(vertices: Tensor, topology: Topology) -> int:
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
         TorchfairError: inside ``torch.func.vmap``, where numbers cannot be read.
+
+    Example:
+        >>> from torchfair.geometry import rings_for_noise
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> rings_for_noise(ball.vertices, ball.topology)
+        2
     """
     with torch.no_grad():
         return _fitted_by_noise(vertices.detach(), topology).rings

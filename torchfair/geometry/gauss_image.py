@@ -37,5 +37,15 @@ def gauss_image(vertices: Tensor, topology: Topology) -> GaussImage:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import gauss_image
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> image = gauss_image(vertices, topology)
+        >>> image.arcs.shape  # one for the ridge, between two of image.points
+        torch.Size([1, 2])
     """
     return GaussImage(face_normals(vertices, topology), topology.interior_edge_faces)

@@ -29,6 +29,15 @@ def edge_vectors(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import edge_vectors
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> edge_vectors(vertices, topology)[0]  # along the ridge
+        tensor([-2.,  0.,  0.])
     """
     topology.check_vertices(vertices)
     v, w = topology.edges.unbind(1)
@@ -51,5 +60,14 @@ def edge_lengths(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import edge_lengths
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> edge_lengths(vertices, topology)  # the ridge first: interior edges come before the boundary
+        tensor([2.0000, 2.0000, 2.2361, 2.2361, 2.2361, 2.2361, 2.0000])
     """
     return norm(edge_vectors(vertices, topology))

@@ -40,6 +40,14 @@ def mean_curvature_vectors(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import mean_curvature_vectors
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> vectors = mean_curvature_vectors(ball.vertices, ball.topology)
+        >>> vectors.shape  # integrals over the stars
+        torch.Size([162, 3])
     """
     topology.check_vertices(vertices)
     groups = [corners for _, corners in face_groups(topology)]

@@ -37,6 +37,16 @@ def face_normals(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import face_normals
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> face_normals(vertices, topology)
+        tensor([[ 0.0000, -0.4472,  0.8944],
+                [ 0.0000,  0.4472,  0.8944]])
     """
     topology.check_vertices(vertices)
     return map_faces(vertices, topology, unit_normal)
@@ -52,6 +62,15 @@ def degenerate_faces(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import degenerate_faces
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> degenerate_faces(vertices, topology)
+        tensor([False, False])
     """
     return (face_normals(vertices, topology) == 0).all(-1)
 
@@ -72,6 +91,14 @@ def vertex_normals(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import vertex_normals
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> normals = vertex_normals(ball.vertices, ball.topology)
+        >>> (normals - ball.normals).norm(dim=1).max() < 0.02
+        tensor(True)
     """
     normals = gather(face_normals(vertices, topology), topology.corner_faces)
     weighted = corner_angles(vertices, topology)[..., None] * normals
@@ -94,6 +121,16 @@ def adjacent_normals(vertices: Tensor, topology: Topology) -> tuple[Tensor, Tens
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import adjacent_normals
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> left, right, degenerate = adjacent_normals(vertices, topology)
+        >>> left, right
+        (tensor([[ 0.0000, -0.4472,  0.8944]]), tensor([[0.0000, 0.4472, 0.8944]]))
     """
     normals = face_normals(vertices, topology)
     left_faces, right_faces = topology.interior_edge_faces.unbind(1)

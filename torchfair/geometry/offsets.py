@@ -35,6 +35,9 @@ def offset_directions(vertices: Tensor, topology: Topology) -> Tensor:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
 
     Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import offset_directions
         >>> cube = torch.cartesian_prod(*[torch.tensor([0.0, 1.0], dtype=torch.float64)] * 3)
         >>> faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
         >>> offset_directions(cube, Topology.from_faces(faces))[7].round(decimals=9)
@@ -63,6 +66,13 @@ def conical_deviations(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import conical_deviations
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> conical_deviations(mesh.vertices, mesh.topology).max() < 0.02  # principal quads are nearly conical
+        tensor(True)
     """
     _, misfits, counts = _directions_and_misfits(vertices, topology)
     squares = scatter_sum(misfits.square()[..., None], topology.corners, topology.num_vertices).squeeze(-1)

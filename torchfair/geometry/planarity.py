@@ -39,6 +39,18 @@ def planarity(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair import Topology
+        >>> from torchfair.geometry import planarity
+        >>> vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 1], [0, 4, 0], [2, 4, 0]])
+        >>> topology = Topology.from_faces([[0, 1, 2, 3], [3, 2, 5, 4]])  # a ridge
+        >>> planarity(vertices, topology)
+        tensor([0., 0.])
+        >>> vertices[0, 2] += 0.1
+        >>> planarity(vertices, topology)  # distances of the diagonals
+        tensor([0.0214, 0.0000])
     """
     topology.check_vertices(vertices)
     return map_faces(vertices, topology, _relative_deviation).squeeze(-1)

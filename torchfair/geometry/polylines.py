@@ -25,6 +25,13 @@ def second_differences(vertices: Tensor, triples: Tensor) -> Tensor:
 
     Raises:
         ShapeError: if ``triples`` is not an integer tensor (N, 3).
+
+    Example:
+        >>> import torch
+        >>> from torchfair.geometry import second_differences
+        >>> line = torch.tensor([[0.0, 0, 0], [1, 0, 0], [2, 0.5, 0]])
+        >>> second_differences(line, torch.tensor([[0, 1, 2]]))
+        tensor([[0.0000, 0.5000, 0.0000]])
     """
     check_triples(triples)
     previous, here, following = gather(vertices, triples).unbind(-2)

@@ -50,6 +50,15 @@ def principal_values(
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
         TorchfairError: for an unknown estimator, and for ``rings`` as in :func:`fitted_curvature`.
+
+    Example:
+        >>> from torchfair.geometry import principal_values, vertex_areas
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> values = principal_values(ball.vertices, ball.topology)
+        >>> areas = vertex_areas(ball.vertices, ball.topology)
+        >>> (values / areas[:, None]).mean(0)  # nearly 1 / 2 twice
+        tensor([0.4985, 0.4977], dtype=torch.float64)
     """
     _check(estimator)
     if estimator == "fitted":
@@ -90,6 +99,13 @@ def principal_directions(
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
         TorchfairError: for an unknown estimator, and for ``rings`` as in :func:`fitted_curvature`.
+
+    Example:
+        >>> from torchfair.geometry import principal_directions
+        >>> from torchfair.shapes import Catenoid, principal_quads
+        >>> mesh = principal_quads(Catenoid(), 8, 16)
+        >>> principal_directions(mesh.vertices, mesh.topology).shape
+        torch.Size([144, 2, 3])
     """
     _check(estimator)
     if estimator == "fitted":

@@ -33,6 +33,7 @@ def closest_on(reference: Reference) -> ReferenceFunction:
         numbers that are not finite.
 
     Example:
+        >>> from torchfair.geometry import closest_on
         >>> import torch
         >>> def unit_sphere(points):
         ...     normals = points / points.norm(dim=1, keepdim=True)

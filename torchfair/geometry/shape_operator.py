@@ -48,6 +48,13 @@ def shape_operators(vertices: Tensor, topology: Topology, *, sine: bool = True) 
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import shape_operators
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> shape_operators(ball.vertices, ball.topology).shape  # integrals over the stars
+        torch.Size([162, 3, 3])
     """
     edges = edge_vectors(vertices, topology)[..., : topology.num_interior_edges, :]
     if sine:

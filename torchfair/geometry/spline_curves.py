@@ -74,6 +74,7 @@ class SplineCurves:
             finite or beyond 1e70.
 
     Example:
+        >>> from torchfair.geometry import SplineCurves
         >>> import torch
         >>> square = torch.tensor([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
         >>> round = SplineCurves([square], [True])

@@ -28,6 +28,14 @@ def star_normals(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import star_normals
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> normals = star_normals(ball.vertices, ball.topology)
+        >>> normals.shape
+        torch.Size([162, 3])
     """
     corners = gather(face_normals(vertices, topology), topology.corner_faces)
     total = scatter_sum(corners, topology.corners, topology.num_vertices)

@@ -24,6 +24,12 @@ def tangent_bases(normals: Tensor) -> Tensor:
     Returns:
         (..., 2, 3): unit vectors, or two zero vectors, with zero derivatives, where the normal is zero. It
         does not turn with the mesh: only what is built from it does.
+
+    Example:
+        >>> import torch
+        >>> from torchfair.geometry import tangent_bases
+        >>> tangent_bases(torch.tensor([[0.0, 0.0, 1.0]])).shape
+        torch.Size([1, 2, 3])
     """
     x, y, z = normals.unbind(-1)
     sign = torch.where(z < CUT, -1.0, 1.0).to(normals.dtype)

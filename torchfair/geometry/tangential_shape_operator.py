@@ -45,6 +45,13 @@ def tangential_shape_operators(
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
         TorchfairError: for an unknown estimator.
+
+    Example:
+        >>> from torchfair.geometry import tangential_shape_operators
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> tangential_shape_operators(ball.vertices, ball.topology).shape
+        torch.Size([162, 2, 2])
     """
     operators = star_operators(vertices, topology, estimator, sine)
     return restrict(operators, tangent_bases(star_normals(vertices, topology)))

@@ -33,6 +33,13 @@ def umbrella_vectors(vertices: Tensor, topology: Topology, *, include_boundary: 
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import umbrella_vectors
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> umbrella_vectors(ball.vertices, ball.topology).shape
+        torch.Size([162, 3])
     """
     edges = edge_vectors(vertices, topology)
     v, w = topology.edges.unbind(1)

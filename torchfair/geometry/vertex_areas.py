@@ -26,6 +26,13 @@ def vertex_areas(vertices: Tensor, topology: Topology) -> Tensor:
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+
+    Example:
+        >>> from torchfair.geometry import vertex_areas
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(2, radius=2.0)
+        >>> vertex_areas(ball.vertices, ball.topology).sum()  # of the sphere 16 pi = 50.27
+        tensor(49.3194, dtype=torch.float64)
     """
     shares = face_areas(vertices, topology) / topology.face_sizes
     corners = gather(shares[..., None], topology.corner_faces)

@@ -77,6 +77,7 @@ class PolygonMesh:
             ShapeError: the points are no (V, 3) numbers.
 
         Example:
+            >>> from torchfair import PolygonMesh
             >>> mesh = PolygonMesh.from_arrays([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
             >>> vertices, topology = mesh
             >>> vertices.shape, topology.num_edges

@@ -108,8 +108,9 @@ def factorise(matrix: Matrix, damping: Tensor | None = None, *, solver: str | Li
 
     Example:
         >>> import scipy.sparse as sp, torch
+        >>> from torchfair.linear import factorise
         >>> chain = sp.diags([[-1.0, -1.0], [2.0, 2.0, 2.0], [-1.0, -1.0]], [-1, 0, 1])
-        >>> factorise(chain).solve(torch.tensor([1.0, 0.0, 1.0], dtype=torch.float64)).values
+        >>> factorise(chain).solve(torch.tensor([1.0, 0.0, 1.0], dtype=torch.float64)).values.round(decimals=9)
         tensor([1., 1., 1.], dtype=torch.float64)
     """
     system: System = matrix if hasattr(matrix, "pattern") else MatrixSystem(matrix)

@@ -65,6 +65,7 @@ def principal_quads(
             found, with the place.
 
     Example:
+        >>> from torchfair.meshing import principal_quads
         >>> from torchfair.shapes import Torus, irregular_triangles
         >>> surface = irregular_triangles(Torus(), 800)
         >>> mesh = principal_quads(surface.vertices, surface.topology, count=300)

@@ -56,6 +56,7 @@ def principal_triangles(
         ShapeError, SettingsError, MeshError: as :func:`principal_quads`.
 
     Example:
+        >>> from torchfair.meshing import principal_triangles
         >>> from torchfair.shapes import Torus, irregular_triangles
         >>> surface = irregular_triangles(Torus(), 800)
         >>> mesh = principal_triangles(surface.vertices, surface.topology, count=600)

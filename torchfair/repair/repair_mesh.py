@@ -50,6 +50,7 @@ def repair_mesh(
             corners.
 
     Example:
+        >>> from torchfair.repair import repair_mesh
         >>> import torch
         >>> points = torch.tensor([[0., 0, 0], [1, 0, 0], [1, 1, .2], [0, 0, 0], [1, 1, .2], [0, 1, 0]])
         >>> mesh = repair_mesh(points, [[0, 1, 2], [3, 4, 5]], weld=True)

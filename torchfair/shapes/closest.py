@@ -40,6 +40,8 @@ class ClosestOnSurface:
         TorchfairError: if ``samples`` is not an integer from 2 on.
 
     Example:
+        >>> import torch
+        >>> from torchfair.shapes import ClosestOnSurface
         >>> from torchfair.shapes import Torus
         >>> positions, normals = ClosestOnSurface(Torus(2.0, 0.5))(torch.tensor([[3.0, 0.0, 0.0]], dtype=torch.float64))
         >>> positions.round(decimals=6)
@@ -151,6 +153,8 @@ class ClosestOnLevelSet:
             twice; it need not be a distance, but its gradient must not vanish near the level set.
 
     Example:
+        >>> import torch
+        >>> from torchfair.shapes import ClosestOnLevelSet
         >>> ball = ClosestOnLevelSet(lambda p: p.square().sum() - 4.0)
         >>> ball(torch.tensor([[0.0, 3.0, 4.0]], dtype=torch.float64))[0]
         tensor([[0.0000, 1.2000, 1.6000]], dtype=torch.float64)
@@ -219,6 +223,8 @@ def closest_on_height_field(height: Callable[[Tensor, Tensor], Tensor]) -> Close
             twice, wherever jobs may ask.
 
     Example:
+        >>> import torch
+        >>> from torchfair.shapes import closest_on_height_field
         >>> closest = closest_on_height_field(lambda x, y: 0.5 * (x * x - y * y))
         >>> closest(torch.tensor([[0.0, 0.0, 0.5]], dtype=torch.float64))[0].abs()
         tensor([[0., 0., 0.]], dtype=torch.float64)

@@ -61,6 +61,7 @@ def polar_dual(vertices: Tensor, topology: Topology, centre: Tensor | None = Non
             the first few are named. Also if there is no inner vertex, or polygons meet as they cannot in a mesh.
 
     Example:
+        >>> from torchfair.stars import polar_dual
         >>> from torchfair.shapes import icosphere
         >>> dual = polar_dual(icosphere(0).vertices, icosphere(0).topology)
         >>> dual.topology  # a dodecahedron

@@ -62,7 +62,15 @@ def pyramid_penalty(vertices: Tensor, topology: Topology) -> Tensor:
 
 @safe_to_load
 class PyramidPenalty(MeshModule):
-    """Module form of :func:`pyramid_penalty`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,)."""
+    """Module form of :func:`pyramid_penalty`: ``forward(vertices)`` (*batch, V, 3) -> (*batch,).
+
+    Example:
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> from torchfair.stars import PyramidPenalty
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> PyramidPenalty(mesh.topology)(mesh.vertices)  # no pyramid of this funnel intersects itself
+        tensor(0., dtype=torch.float64)
+    """
 
     groups: list[StarGroup]
 

@@ -87,6 +87,13 @@ class SaddlePenalty(MeshModule):
         topology: connectivity of all meshes that the module is called with.
         saddles: (V,) bool, see :func:`saddle_penalty`.
         reduction: see :class:`~torchfair.energies.MeshModule`.
+
+    Example:
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> from torchfair.stars import SaddlePenalty
+        >>> mesh = principal_triangles(Catenoid(), 8, 16)
+        >>> SaddlePenalty(mesh.topology)(mesh.vertices)  # all stars of this funnel are good saddles
+        tensor(0., dtype=torch.float64)
     """
 
     groups: list[SaddleGroup]

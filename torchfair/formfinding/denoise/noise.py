@@ -45,6 +45,15 @@ def noise_level(vertices: Tensor, topology: Topology, near: Neighbourhoods | Non
     Example::
 
         sigma = noise_level(vertices, topology)
+
+    Example:
+        >>> import torch
+        >>> from torchfair.formfinding import noise_level
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(3)
+        >>> noise = 0.02 * torch.randn(ball.vertices.shape, generator=torch.manual_seed(0), dtype=torch.float64)
+        >>> 0.015 < noise_level(ball.vertices + noise, ball.topology) < 0.025
+        True
     """
     near = Neighbourhoods.of(topology) if near is None else near
     remainders, freedom = _remainders(vertices, topology, near)

@@ -96,5 +96,15 @@ def denoise(
 
         result = denoise(vertices, topology)
         print(result.after["noise"], result.after["flipped_faces"], result.seconds)
+
+    Example:
+        >>> import torch
+        >>> from torchfair.formfinding import denoise
+        >>> from torchfair.shapes import icosphere
+        >>> ball = icosphere(3)
+        >>> noise = 0.02 * torch.randn(ball.vertices.shape, generator=torch.manual_seed(0), dtype=torch.float64)
+        >>> result = denoise(ball.vertices + noise, ball.topology)
+        >>> result.after["normal_variation"] < 0.5 * result.before["normal_variation"]
+        True
     """
     return solved(lambda: DenoiseRecipe(vertices, topology, settings=settings), vertices, callback=callback)

@@ -37,6 +37,7 @@ def planar_quads(
         ShapeError: if the surface is not one mesh.
 
     Example:
+        >>> from torchfair.formfinding import planar_quads
         >>> from torchfair.meshing import principal_quads
         >>> from torchfair.shapes import Cylinder, irregular_triangles
         >>> tube = irregular_triangles(Cylinder(), 500)

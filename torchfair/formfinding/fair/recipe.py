@@ -201,6 +201,16 @@ def minimise_normal_variation(
 
         result = minimise_normal_variation(vertices, topology)
         print(result.before["normal_variation"], result.after["normal_variation"], result.holds)
+
+    Example:
+        >>> from torchfair.formfinding import minimise_normal_variation
+        >>> from torchfair.shapes import Catenoid, irregular_triangles
+        >>> mesh = irregular_triangles(Catenoid(), 60)
+        >>> result = minimise_normal_variation(mesh.vertices, mesh.topology)
+        >>> result.after["normal_variation"] < 0.95 * result.before["normal_variation"]
+        True
+        >>> result.holds
+        True
     """
     chosen = list(fixed)
 

@@ -33,6 +33,19 @@ def prescribed_normals(
     Raises:
         ShapeError: normals are not one for each point of their curve.
         MeshError: the curves do not fit the boundary.
+
+    Example:
+        >>> import math
+        >>> import torch
+        >>> from torchfair.curves import ClosedCurve
+        >>> from torchfair.formfinding import prescribed_normals, start_surface
+        >>> turn = torch.linspace(0, 2 * math.pi, 25)[:-1].double()
+        >>> curve = ClosedCurve(torch.stack([turn.cos(), turn.sin(), 0 * turn], dim=1))
+        >>> vertices, topology = start_surface([curve], 60)
+        >>> upwards = torch.tensor([0.0, 0.0, 1.0]).double().expand(24, 3)
+        >>> normals = prescribed_normals(vertices, topology, [curve], [(curve, upwards)])
+        >>> normals[topology.is_boundary_vertex].mean(0)
+        tensor([0., 0., 1.], dtype=torch.float64)
     """
     track = BoundaryTrack.onto(vertices.detach().to("cpu", torch.float64), topology.to("cpu"), curves)
     result = torch.zeros(topology.num_vertices, 3, dtype=torch.float64)

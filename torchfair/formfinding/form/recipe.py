@@ -251,6 +251,18 @@ def minimise_absolute_curvature(
         vertices, topology = start_surface([curve], 500)
         result = minimise_absolute_curvature(vertices, topology, curves=[curve], levels=1)
         print(result.after["total_absolute_curvature"], result.holds)
+
+    Example:
+        >>> import math
+        >>> import torch
+        >>> from torchfair.curves import ClosedCurve
+        >>> from torchfair.formfinding import minimise_absolute_curvature, start_surface
+        >>> turn = torch.linspace(0, 2 * math.pi, 25)[:-1].double()
+        >>> curve = ClosedCurve(torch.stack([turn.cos(), turn.sin(), 0.3 * torch.cos(2 * turn)], dim=1))
+        >>> vertices, topology = start_surface([curve], 60)
+        >>> result = minimise_absolute_curvature(vertices, topology, curves=[curve])
+        >>> result.after["total_absolute_curvature"] < result.before["total_absolute_curvature"]
+        True
     """
     if starts < 1:
         raise SettingsError(f"starts must be at least 1, got {starts}")

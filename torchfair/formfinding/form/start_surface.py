@@ -56,6 +56,17 @@ def start_surface(curves: Sequence[ClosedCurve], count: int = 1000) -> tuple[Ten
     Raises:
         MeshError: no curve, a count below 7, curves that cross, touch or repeat themselves or each other, or no
             surface is found.
+
+    Example:
+        >>> import math
+        >>> import torch
+        >>> from torchfair.curves import ClosedCurve
+        >>> from torchfair.formfinding import start_surface
+        >>> turn = torch.linspace(0, 2 * math.pi, 25)[:-1].double()
+        >>> curve = ClosedCurve(torch.stack([turn.cos(), turn.sin(), 0.3 * torch.cos(2 * turn)], dim=1))
+        >>> vertices, topology = start_surface([curve], 60)
+        >>> topology.loop_offsets.tolist()[-1] == int(topology.is_boundary_vertex.sum())
+        True
     """
     if count < 7:
         raise MeshError(f"a start surface needs at least 7 vertices, got count = {count}")

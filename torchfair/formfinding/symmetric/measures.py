@@ -27,6 +27,16 @@ def condition_residuals(vertices: Tensor, principal: PrincipalEdges, stars: Prin
         alike, over the mean length of the edges to them. ``coplanar`` (n,): for every principal edge between stars
         the determinant of both normals and the edge, over its length: the sine of the angle by which one normal
         leaves the plane of the other and the edge, times that between other normal and edge.
+
+    Example:
+        >>> from torchfair.formfinding import condition_residuals
+        >>> from torchfair.principal import principal_edges_of_lattice
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 6, 12)
+        >>> edges = principal_edges_of_lattice(mesh)
+        >>> residuals = condition_residuals(mesh.vertices, edges, edges.stars())
+        >>> sorted(residuals)
+        ['coplanar', 'cospherical']
     """
     spheres = star_spheres(vertices, stars)
     spokes = vertices[stars.cospherical] - vertices[stars.vertices, None]

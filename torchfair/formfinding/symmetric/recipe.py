@@ -241,6 +241,17 @@ def principal_symmetric(
 
         result = principal_symmetric(vertices, principal, handles={17: (0.1, 0.0, 0.4)}, levels=1)
         print(result.vertices, result.levels[-1].principal, result.holds)
+
+    Example:
+        >>> from torchfair.formfinding import principal_symmetric
+        >>> from torchfair.principal import principal_edges_of_lattice
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 6, 12)
+        >>> edges = principal_edges_of_lattice(mesh)
+        >>> target = (1.1 * mesh.vertices[0]).tolist()
+        >>> result = principal_symmetric(mesh.vertices, edges, handles={0: target})
+        >>> result.after["largest_cospherical"] < 1e-6
+        True
     """
 
     def begin() -> SymmetricRecipe:

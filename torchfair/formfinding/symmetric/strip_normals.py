@@ -41,6 +41,15 @@ def strip_normals(vertices: Tensor, principal: PrincipalEdges, stars: PrincipalS
 
     Returns:
         (V, 3) in the dtype of the vertices; unit vectors, zero where there is no face.
+
+    Example:
+        >>> from torchfair.formfinding import strip_normals
+        >>> from torchfair.principal import principal_edges_of_lattice
+        >>> from torchfair.shapes import Catenoid, principal_triangles
+        >>> mesh = principal_triangles(Catenoid(), 6, 12)
+        >>> edges = principal_edges_of_lattice(mesh)
+        >>> strip_normals(mesh.vertices, edges).shape
+        torch.Size([84, 3])
     """
     stars = principal.stars() if stars is None else stars
     start = principal_normals(vertices.detach().to("cpu", torch.float64), principal.to("cpu"), stars)
