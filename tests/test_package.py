@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import json
+import re
 import runpy
 import subprocess
 import sys
@@ -95,8 +96,18 @@ def test_reading_and_writing_own_formats_does_not_import_trimesh() -> None:
     assert sorted({"trimesh", "scipy.sparse.csgraph"} & modules_after(statement)) == []
 
 
-def test_version_and_errors() -> None:
-    assert torchfair.__version__.count(".") == 2
+def test_version_and_date_are_the_same_everywhere() -> None:
+    root = Path(__file__).resolve().parent.parent
+    changes = (root / "CHANGELOG.md").read_text(encoding="utf-8")
+    released = re.findall(r"^## (\d+\.\d+\.\d+) \((\d{4}-\d\d-\d\d)\)$", changes, re.M)
+    citation = (root / "CITATION.cff").read_text(encoding="utf-8")
+    assert released[0][0] == torchfair.__version__
+    assert re.findall(r"^version: (.*)\ndate-released: (.*)$", citation, re.M) == released[:1]
+    newest = changes.split("\n## ")[2 if "## Unreleased" in changes else 1]
+    assert re.findall(r"^### (.*)$", newest, re.M) == ["Added", "Changed", "Fixed"]
+
+
+def test_errors() -> None:
     for error in (torchfair.MeshError, torchfair.ShapeError, torchfair.MeshFileError):
         assert issubclass(error, torchfair.TorchfairError)
         assert issubclass(error, ValueError)

@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from .repair.repair_mesh import repair_mesh as repair_mesh
     from .topology import Topology as Topology
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _NAMES = {
     "energies": (
