@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -43,11 +44,11 @@ def maps_seen() -> Iterator[list[SeamlessMap]]:
     seen: list[SeamlessMap] = []
     trace = attempt.trace_cells
 
-    def tracing(found: SeamlessMap, *rest: object) -> object:
+    def tracing(found: SeamlessMap, *rest: Any) -> Any:
         seen.append(found)
         return trace(found, *rest)
 
-    attempt.trace_cells = tracing
+    attempt.trace_cells = tracing  # type: ignore[assignment]  # watched while it works
     try:
         yield seen
     finally:
@@ -106,7 +107,9 @@ def spread(found: SeamlessMap, distance: float) -> np.ndarray:
 # ---- pictures ------------------------------------------------------------------------------------------
 
 
-def painted(mesh: Mesh, camera: Camera, size: tuple[int, int], lines: Lines = (), *, edges: bool = False) -> Tensor:
+def painted(
+    mesh: Mesh, camera: Camera, size: tuple[int, int], lines: Lines | tuple[()] = (), *, edges: bool = False
+) -> Tensor:
     """A shaded mesh, with its edges or lines on it."""
     view = MeshView(*mesh, camera, size)
     picture = view.paint(shade_faces(*mesh, camera), edges=quiet_edges(view) if edges else outline(view)).float()

@@ -30,6 +30,7 @@ from torchfair.viewing.wireframe import quiet_edges
 
 IMAGES = Path(__file__).resolve().parent / "images"
 CELL, HEIGHT = 400, 300
+UP = torch.tensor([0.0, 0.0, 1.0])
 PRINCIPAL, EXCEPTION, STRIP = (0.75, 0.22, 0.17), (0.95, 0.66, 0.13), (0.90, 0.72, 0.55)
 
 
@@ -40,7 +41,8 @@ def cone(sectors: int, rings: int) -> tuple[Tensor, Topology]:
         for i in range(sectors * ring):
             corner, step = divmod(i, ring)
             a, b = (math.tau * (corner + end) / sectors for end in (0, 1))
-            places.append(tuple((ring - step) * f(a) + step * f(b) for f in (math.cos, math.sin)))
+            x, y = ((ring - step) * f(a) + step * f(b) for f in (math.cos, math.sin))
+            places.append((x, y))
 
     def number(ring: int, place: int) -> int:
         return 1 + sectors * ring * (ring - 1) // 2 + place % (sectors * ring) if ring else 0
@@ -91,7 +93,7 @@ def draw_labels(path: Path) -> None:
     for column, (words, (vertices, edges)) in enumerate(meshes.items()):
         topology = edges.topology
         camera, size = fit_camera(
-            vertices, towards_eye=(0.1, -0.75, 0.65), up=(0.0, 0.0, 1.0), width=CELL - 24, height=HEIGHT
+            vertices, towards_eye=torch.tensor([0.1, -0.75, 0.65]), up=UP, width=CELL - 24, height=HEIGHT
         )
         picture = MeshView(vertices, topology, camera, size)
         quiet = quiet_edges(picture)
@@ -119,7 +121,7 @@ def draw_strips(path: Path) -> None:
     both = Topology.from_faces(faces)
     width = 2 * CELL
     camera, size = fit_camera(
-        vertices, towards_eye=(0.5, -0.8, 0.6), up=(0.0, 0.0, 1.0), width=width - 24, height=HEIGHT + 140
+        vertices, towards_eye=torch.tensor([0.5, -0.8, 0.6]), up=UP, width=width - 24, height=HEIGHT + 140
     )
     picture = MeshView(vertices, both, camera, size)
     base = torch.tensor(FRONT).repeat(both.num_faces, 1).double()

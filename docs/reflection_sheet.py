@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -42,7 +43,7 @@ def evening() -> EquirectangularImage:
     return EquirectangularImage(torch.where(height[..., None] > 0, sky, ground).clamp(0, 1).movedim(-1, 0))
 
 
-def picture(camera: Camera, environment: Environment, **settings: object) -> Tensor:
+def picture(camera: Camera, environment: Environment, **settings: Any) -> Tensor:
     """Colours (H, W, 3) of a torus of plane quads among its surroundings, on white."""
     mesh = principal_quads(Torus(), 96, 48)
     image, coverage, _ = render_reflection(
@@ -58,7 +59,7 @@ def main() -> None:
     """Writes the picture."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES
     points = principal_quads(Torus(), 96, 48).vertices
-    fit = {"directions": DIRECTION, "aspect": WIDTH / HEIGHT}
+    fit: dict[str, Any] = {"directions": DIRECTION, "aspect": WIDTH / HEIGHT}
     afar, near = OrthographicCamera.fit(points, **fit), PerspectiveCamera.fit(points, fields_of_view=70.0, **fit)
     stripes = Stripes(torch.tensor([1.0, 0.4, 0.3]), 1.25)
     pictures = {

@@ -173,7 +173,7 @@ def _triangulated(loops: Sequence[Points], h: float, random: np.random.Generator
     count = int(_CANDIDATES * np.prod(high - low) / h**2)
     candidates = random.uniform(low, high, (count, 2))
     candidates = candidates[_is_inside(candidates, loops)]
-    distance = cKDTree(outline).query(candidates)[0]
+    distance = np.asarray(cKDTree(outline).query(candidates)[0])
     tree, chosen = cKDTree(candidates), []
     while distance.max() > _CLOSEST * h:
         chosen.append(int(np.argmax(distance)))

@@ -112,10 +112,10 @@ def evening_sky(height: int = 512) -> EquirectangularImage:
     sky = mix(color(0.98, 0.84, 0.66), color(0.20, 0.40, 0.70), 1 - (1 - up) ** 2.2)
     glow = torch.exp(-((turn - 0.9) ** 2 / 0.5 + (level - 0.15) ** 2 / 0.06))
     sky = sky + (color(1.0, 0.93, 0.80)[:, None, None] - sky) * glow
-    streaks = sum(
-        torch.sin(k * level * 9 + 1.7 * torch.sin(m * turn + k) + k) * torch.sin(m * turn + 2.1 * k) / k
-        for k, m in ((1, 2), (2, 3), (3, 5))
-    )
+    streaks = torch.zeros_like(level)
+    for k, m in ((1, 2), (2, 3), (3, 5)):
+        wave = torch.sin(k * level * 9 + 1.7 * torch.sin(m * turn + k) + k)
+        streaks = streaks + wave * torch.sin(m * turn + 2.1 * k) / k
     cloud = torch.sigmoid(5 * (streaks - 0.55)) * torch.sigmoid(12 * (1.1 - level)) * (level > 0.12)
     sky = sky + (1 - sky) * 0.65 * cloud
     block = torch.floor(turn * 18 / math.pi)

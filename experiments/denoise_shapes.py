@@ -15,6 +15,7 @@ import statistics
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from time import process_time
 
 import torch
@@ -109,9 +110,9 @@ def against(clean: Mesh, surface: ReferenceSurface, vertices: Tensor) -> dict[st
 def filters(vertices: Tensor, topology: Topology) -> dict[str, list[Callable[[], Tensor]]]:
     """The filters with all their settings."""
     return {
-        "taubin": [lambda rounds=rounds: taubin(vertices, topology, rounds) for rounds in TAUBIN_ROUNDS],
+        "taubin": [partial(taubin, vertices, topology, rounds) for rounds in TAUBIN_ROUNDS],
         "bilateral": [
-            lambda width=width, rounds=rounds: bilateral_normals(vertices, topology, width=width, rounds=rounds)
+            partial(bilateral_normals, vertices, topology, width=width, rounds=rounds)
             for width in BILATERAL_WIDTHS
             for rounds in BILATERAL_ROUNDS
         ],

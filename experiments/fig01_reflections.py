@@ -18,8 +18,9 @@ from _layouts import ELONGATED, IRREGULAR, QUADS, layout, meshed_quads
 from _mirrors import Mirror, evening_sky, mirror_picture, panel_width, panels, plane_panels, smooth_mirror, striped
 
 from torchfair.energies import normal_variation
+from torchfair.meshing import QuadMesh
 from torchfair.reflection import ReflectionSetup, SmoothReference, reflection_score
-from torchfair.shapes import Catenoid
+from torchfair.shapes import Catenoid, ShapeMesh
 from torchfair.viewing import fit_camera
 
 NAME = "fig01_reflections"
@@ -46,8 +47,9 @@ def experiment(config: Config, results: Results) -> Report:
     """Meshes, measures, draws."""
     reference = SmoothReference.of_surface(SURFACE)
     setup = ReflectionSetup.for_reference(reference, size=config.size)
-    meshes = {name: layout(SURFACE, kind, config.rows, config.seed) for name, kind in PANELS.items()}
-    meshes[MESHED] = made = meshed_quads(meshes[TRIANGLES], config.rows)
+    laid_out = {name: layout(SURFACE, kind, config.rows, config.seed) for name, kind in PANELS.items()}
+    meshes: dict[str, ShapeMesh | QuadMesh] = {**laid_out}
+    meshes[MESHED] = made = meshed_quads(laid_out[TRIANGLES], config.rows)
     report: dict[str, Report] = {}
     for name, mesh in meshes.items():
         score = reflection_score(mesh.vertices, mesh.topology, setup)

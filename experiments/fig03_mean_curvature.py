@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import torch
 from _charts import BLUE, DASHES, GREEN, ORANGE, RED, add_chart, add_legend
@@ -177,7 +177,8 @@ def draw_errors(reports: dict[str, Report], results: Results) -> None:
     ]
     for (name, rows), color in zip(reports.items(), (BLUE, RED), strict=True):
         sizes = [float(size) for size in rows]
-        style = {"color": color, "marker": "o", "markersize": points(8), "linewidth": points(3), "label": name}
+        style: dict[str, Any] = {"color": color, "marker": "o", "markersize": points(8), "linewidth": points(3)}
+        style["label"] = name
         charts[0].plot(sizes, [row["error"]["all"] for row in rows.values()], **style)
         charts[2].plot(sizes, [row["face_normal_error_degrees"] for row in rows.values()], **style)
         for key, (label, tint) in CLASSES.items():

@@ -132,7 +132,7 @@ def experiment(config: Config, results: Results) -> Report:
     """Pulls, measures, draws."""
     mesh, principal = annulus(config)
     handles = rim_handles(mesh, config)
-    settings = SymmetricSettings(formulation=config.formulation)
+    settings = SymmetricSettings(formulation=config.formulation)  # type: ignore[arg-type]  # checked there
     maker = SymmetricDesign(mesh.vertices, principal, handles=list(handles), settings=settings)
     (design,) = design_levels(maker, handles, 0)
     start = Level(mesh.vertices, principal, {})

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from _chains import PLANAR, QUADS, Mesh, chain, direction, figures_on
@@ -90,7 +91,7 @@ def experiment(config: Config, results: Results) -> Report:
         results.mesh(FILES[name], *mesh)
     draw(config, meshes, reference, report, results)
     draw_facade(config, meshes[PLANAR], results)
-    same = {"view": VIEW, "width": min(config.width, _SINGLE), "overwrite": results.force}
+    same: dict[str, Any] = {"view": VIEW, "width": min(config.width, _SINGLE), "overwrite": results.force}
     picture_curvature(results.path(CURVATURE), [("surface of least C", *surface)], **same)
     shown = {name: mesh for name, mesh in meshes.items() if name != PANELS}
     picture_edges(results.path(EDGES), {name: v for name, (v, _) in shown.items()}, [t for _, t in shown.values()],

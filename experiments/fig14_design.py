@@ -123,7 +123,7 @@ def experiment(config: Config, results: Results) -> Report:
     mesh = principal_triangles(SURFACE, config.rows, config.around, along="u")
     principal = principal_edges_of_lattice(mesh, "u")
     handles = equator_handles(mesh, config)
-    settings = SymmetricSettings(formulation=config.formulation)
+    settings = SymmetricSettings(formulation=config.formulation)  # type: ignore[arg-type]  # checked there
     maker = SymmetricDesign(mesh.vertices, principal, handles=list(handles), settings=settings)
     levels = design_levels(maker, handles, config.levels)
     start = Level(mesh.vertices, principal, {})

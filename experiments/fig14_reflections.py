@@ -19,8 +19,9 @@ from _layouts import ELONGATED, IRREGULAR, QUADS, layout, meshed_quads
 from _mirrors import Mirror, mirror_picture, panel_width, panels, plane_panels, smooth_mirror, striped
 
 from torchfair.energies import normal_variation
+from torchfair.meshing import QuadMesh
 from torchfair.reflection import ReflectionSetup, SmoothReference, reflection_score
-from torchfair.shapes import Torus
+from torchfair.shapes import ShapeMesh, Torus
 from torchfair.viewing import fit_camera
 
 NAME = "fig14_reflections"
@@ -59,8 +60,9 @@ def experiment(config: Config, results: Results) -> Report:
     meshing: Report = {}
     mirrors: list[list[Mirror]] = []
     for rows in config.rows:
-        meshes = {name: layout(SURFACE, kind, rows, config.seed) for name, kind in PANELS.items()}
-        meshes[MESHED] = made = meshed_quads(meshes[TRIANGLES], rows)
+        laid_out = {name: layout(SURFACE, kind, rows, config.seed) for name, kind in PANELS.items()}
+        meshes: dict[str, ShapeMesh | QuadMesh] = {**laid_out}
+        meshes[MESHED] = made = meshed_quads(laid_out[TRIANGLES], rows)
         meshing[str(rows)] = made.report
         for name, mesh in meshes.items():
             score = reflection_score(mesh.vertices, mesh.topology, setup)

@@ -70,7 +70,7 @@ class Config(ExperimentConfig):
 def run_job(vertices: Tensor, topology: Topology, config: Config, formulation: str) -> tuple[JobResult[Level], Report]:
     """Lowers E and reports what happened."""
     settings = FairSettings(
-        formulation=formulation,
+        formulation=formulation,  # type: ignore[arg-type]  # checked there
         closeness_weight=config.closeness_weight,
         distance_limit=config.distance_limit,
         planar="quads",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from typing import Any
 
 from _chains import PLANAR, QUADS, chain, direction, figures_on, in_words
 from _common import ExperimentConfig, Report, Results, run_experiment, setting
@@ -55,7 +56,7 @@ def experiment(config: Config, results: Results) -> Report:
     for name, row in report.items():
         results.mesh(FILES[name], *meshes[name])
         print(f"{name}: {in_words(row)}")
-    same = {"view": VIEW, "width": config.width, "overwrite": results.force}
+    same: dict[str, Any] = {"view": VIEW, "width": config.width, "overwrite": results.force}
     picture_curvature(results.path(CURVATURE), [(SURFACE, *surface)], **same)
     picture_edges(results.path(EDGES), {name: v for name, (v, _) in meshes.items() if name != QUADS},
                   [t for name, (_, t) in meshes.items() if name != QUADS], **same)  # fmt: skip

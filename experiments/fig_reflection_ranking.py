@@ -102,8 +102,8 @@ def correlations(cases: list[Report]) -> dict[str, dict[str, float]]:
     for first, second in itertools.combinations(QUANTITIES, 2):
         values = []
         for case in cases:
-            pair = [[float(case[kind][quantity]) for kind in LAYOUTS] for quantity in (first, second)]
-            values.append(float(spearmanr(*pair)[0]))
+            x, y = ([float(case[kind][quantity]) for kind in LAYOUTS] for quantity in (first, second))
+            values.append(float(spearmanr(x, y)[0]))
         found[f"{first}, {second}"] = {"median": float(np.median(values)), "smallest": min(values)}
     return found
 

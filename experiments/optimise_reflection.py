@@ -13,6 +13,7 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import torch
 from _charts import BLUE, GREEN, ORANGE, add_chart, add_legend
@@ -100,6 +101,7 @@ def other_views(setup: ReflectionSetup) -> ReflectionSetup:
     across = torch.linalg.cross(forward.expand_as(between), between)
     along = (between @ forward)[:, None] * forward
     turned = along + math.cos(turn) * (between - along) + math.sin(turn) * across
+    assert setup.reference is not None  # it was made for one
     views = OrthographicCamera.fit(setup.reference.vertices, directions=turned)
     return replace(setup, camera=views)
 
@@ -149,7 +151,7 @@ def run_surface(name: str, config: Config) -> tuple[dict[str, Report], dict[str,
     others = other_views(setup)
     mesh = layout(SADDLES[name], IRREGULAR, config.rows, config.seed)
     both = ReflectionLoss(mesh.topology, setup, variation_weight=config.weight, size=config.size)
-    losses = {BOTH: both, SCORE: both.dissimilarity, ENERGY: both.variation}
+    losses: dict[str, Callable[[Tensor], Tensor]] = {BOTH: both, SCORE: both.dissimilarity, ENERGY: both.variation}
     report, positions = {}, {START: mesh.vertices}
     for kind, loss in losses.items():
         model = GlidingMesh(mesh, config.rows)
@@ -157,7 +159,7 @@ def run_surface(name: str, config: Config) -> tuple[dict[str, Report], dict[str,
         def total(vertices: Tensor, loss: Callable[[Tensor], Tensor] = loss) -> Tensor:
             return loss(vertices) + config.shape * small_angles(vertices, mesh.topology, config.smallest_angle)
 
-        history = optimise(model, total, lambda m=model: measure(m, setup, others), config)
+        history = optimise(model, total, partial(measure, model, setup, others), config)
         first, last = history[0], history[-1]
         changes = {f"{key}_change": float(last[key] / first[key]) - 1
                    for key in ("score", "score_in_other_views", "normal_variation", "wobble")}  # fmt: skip

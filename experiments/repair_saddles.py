@@ -103,7 +103,7 @@ def measure(vertices: Tensor, start: Tensor, topology: Topology, planes: Tangent
         "self_intersecting_pyramids": int((pyramid_self_intersections(vertices, topology) > 0).sum()),
         "moved_vertices": int((moved > MOVED).sum()),
         "largest_displacement": float(moved.max()),
-        "largest_distance": float(planes.reference.closest(vertices).distances.max()),
+        "largest_distance": float((planes({"vertices": vertices})[0] - vertices).norm(dim=1).max()),
     }
 
 

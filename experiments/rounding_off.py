@@ -163,7 +163,8 @@ def measure(config: Config, b: float) -> Report:
             spacing = radius * edge / config.samples
             count = round(2 * HALF / spacing)
             spacing = 2 * HALF / count
-            grid = -HALF + spacing * (np.arange(count + 2 * config.samples) - config.samples + 0.5)
+            cells = np.arange(count + 2 * config.samples, dtype=np.float64)
+            grid: Array = -HALF + spacing * (cells - config.samples + 0.5)
             rounded.append(curvature_of_graph(heights(vertices, topology, grid), config.samples, spacing))
         report["layouts"][name] = {
             "mean_edge_length": edge,

@@ -42,8 +42,9 @@ SURFACES: dict[str, Surface] = {
 COLUMNS = ("good saddles", "other 1, 2, 1, 2", "2, 2, 1, 1", "3, 1, 1, 1", "other saddles", "neither", "convex")
 ORDINARY = ("2, 2, 1, 1 at the vertex normal", "3, 1, 1, 1 at the vertex normal")
 MANY = ("saddles with more than 4 inflection faces", "stars with more than 4 inflection faces")
+BAD: dict[tuple[int, ...], str]
 BAD = {(1, 2, 1, 2): "other 1, 2, 1, 2", (2, 2, 1, 1): "2, 2, 1, 1", (3, 1, 1, 1): "3, 1, 1, 1"}
-ORDINARY_PATTERNS = {(2, 2, 1, 1): ORDINARY[0], (3, 1, 1, 1): ORDINARY[1]}
+ORDINARY_PATTERNS: dict[tuple[int, ...], str] = {(2, 2, 1, 1): ORDINARY[0], (3, 1, 1, 1): ORDINARY[1]}
 REGULAR, RANDOM = "regular", "random"
 
 
