@@ -49,7 +49,7 @@ def callables() -> Iterator[tuple[str, Any, str]]:
 
 
 def without_shape(function: Any, written: str) -> list[str]:
-    """Tensor arguments of which the docstring gives no shape, after their name or, of a single one, anywhere.
+    """Tensor arguments of which the docstring gives no shape, after their name or, of a single one, at all.
 
     Another docstring may be named instead: that one is looked at for itself.
     """
@@ -58,7 +58,8 @@ def without_shape(function: Any, written: str) -> list[str]:
     parameters = inspect.signature(function).parameters
     tensors = [name for name, told in parameters.items() if TENSOR.fullmatch(str(told.annotation).strip("'"))]
     tensors = [name for name in tensors if name not in TEMPLATES]
-    if len(tensors) == 1 and SHAPE.search(written):
+    begin = re.split(r"\n\s*(?:Returns|Raises|Attributes):", written)[0]
+    if len(tensors) == 1 and f"{tensors[0]}:" not in begin and SHAPE.search(begin):
         return []
     near = r"\b{}\b(?:[^\n]|\n(?!\s*\w+: )){{0,160}}?(?:{})"
     return [name for name in tensors if not re.search(near.format(re.escape(name), SHAPE.pattern), written)]

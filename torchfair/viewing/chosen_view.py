@@ -44,7 +44,7 @@ def chosen_view(
     From the front one looks along y if z is up, along -z if y is up, and along x if x is up, as CAD programs do.
 
     Args:
-        vertices: positions.
+        vertices: (V, 3) positions.
         topology: connectivity.
         up: ``"x"``, ``"y"`` or ``"z"``; by default that of :func:`view_direction`.
         angles: azimuth, anticlockwise from the front as seen from above, and elevation, in degrees; by default a
