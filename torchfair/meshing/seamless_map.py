@@ -149,7 +149,8 @@ class MapProblem:
         metric = whole.T @ whole - mixed.T @ answers
         metric = (metric + metric.T) / 2
         scale = np.linalg.eigvalsh(metric)[-1]
-        target = np.linalg.lstsq(metric + 1e-13 * scale * np.eye(count), whole.T @ right - mixed.T @ best)[0]
+        shifted = metric + 1e-13 * scale * np.eye(count)
+        target = np.linalg.lstsq(shifted, whole.T @ right - mixed.T @ best, rcond=None)[0]
         moves = np.asarray(self.split.whole @ self.split.basis - self.split.free @ answers)
         return _Optimum(base, moves, metric / scale, target)
 

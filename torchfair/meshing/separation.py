@@ -105,7 +105,7 @@ def separate_vectors(metric: Floats, target: Floats, rows: Floats, offsets: Floa
             stiff = stiff + _WEIGHT * np.outer(row, row)
             right = right + _WEIGHT * row * (ahead - offsets[2 * pair + part])
         done |= new
-        centre = np.asarray(np.linalg.lstsq(stiff, right)[0], np.float64)
+        centre = np.asarray(np.linalg.lstsq(stiff, right, rcond=None)[0], np.float64)
         vectors = closest_vectors(stiff, centre).vectors
     apart = np.array([not _together(rows, offsets, vector).any() for vector in vectors])
     return vectors[apart] if apart.any() else vectors

@@ -80,6 +80,7 @@ def spread(rule: Differences, faces: Ints, sides: Ints, costs: npt.NDArray[np.fl
     weights = (
         np.ones(len(joined)) if costs is None else np.append(costs, np.full(len(faces), 1e-9 * costs.min(initial=1)))
     )
+    joined = joined.astype(np.int32)  # SciPy before 1.15 takes no other kind
     graph = coo_array((weights, joined.T), shape=(root + 1, root + 1)).tocsr()
     if costs is not None:
         graph = minimum_spanning_tree(graph)
