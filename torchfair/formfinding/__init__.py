@@ -7,6 +7,8 @@ from ..settings.symmetric_settings import SymmetricSettings as SymmetricSettings
 from .denoise.noise import noise_level as noise_level
 from .denoise.recipe import DenoiseRecipe as DenoiseRecipe
 from .denoise.recipe import denoise as denoise
+from .differentiable.finished import JobLayerInfo as JobLayerInfo
+from .differentiable.layer import JobLayer as JobLayer
 from .fair.planar_quads import PLANAR_QUADS as PLANAR_QUADS
 from .fair.planar_quads import planar_quads as planar_quads
 from .fair.recipe import FairRecipe as FairRecipe

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor, nn
-from torch.autograd import Function
 
 from .._numbers import check_count, check_number
-from ..errors import DerivativeError, SettingsError, ShapeError
+from ..errors import ShapeError
 from ..linear import LinearSolver
 from ..settings.projection_settings import ProjectionSettings
-from .adjoint import AdjointSolution, conjugate, stationary
+from .adjoint import AdjointSolution
 from .guided_projection import GuidedProjection
+from .implicit import Backward, BackwardRule, MakeTerms, Minimum, OnFault
 from .layout import State
-from .merit_derivatives import MeritDerivatives
-from .problem import Problem
 from .result import ProjectionResult
-from .stationary_point import Preconditioner, StationaryPoint, polished
-from .term import ElementTerm
-
-Backward = Literal["implicit", "unroll"]
-_LAX = 1e3  # times the accuracy asked for: rounding may not allow more
-
-OnFault = Literal["error", "gauss-newton"]
-MakeTerms = Callable[[Mapping[str, Tensor]], Sequence[ElementTerm]]
+from .stationary_point import StationaryPoint, polished
 
 
 @dataclass
@@ -112,17 +102,10 @@ class ProjectionLayer(nn.Module):
         on_fault: OnFault = "error",
     ) -> None:
         super().__init__()
-        if backward not in get_args(Backward):
-            raise SettingsError(f"backward must be 'implicit' or 'unroll', got {backward!r}")
-        if on_fault not in get_args(OnFault):
-            raise SettingsError(f"on_fault must be 'error' or 'gauss-newton', got {on_fault!r}")
-        for name, count in (("unrolled_steps", unrolled_steps), ("newton_steps", newton_steps), ("products", products)):
-            check_count(name, count, least=0 if name == "newton_steps" else 1)
-        for name, number in (("tolerance", tolerance), ("accuracy", accuracy)):
-            check_number(name, number, above=True, finite=True)
-        self.terms, self.settings, self.backward_by, self.on_fault = terms, settings, backward, on_fault
-        self.unrolled_steps, self.solver, self.tolerance = unrolled_steps, solver, tolerance
-        self.newton_steps, self.accuracy, self.products = newton_steps, accuracy, products
+        self.rule = BackwardRule(backward, unrolled_steps, solver, accuracy, products, on_fault)
+        check_count("newton_steps", newton_steps, least=0)
+        check_number("tolerance", tolerance, above=True, finite=True)
+        self.terms, self.settings, self.tolerance, self.newton_steps = terms, settings, tolerance, newton_steps
         self._example = {name: torch.zeros_like(block) for name, block in blocks.items()}
         self._fixed = dict(fixed or {})
         self._problem: GuidedProjection | None = None
@@ -185,15 +168,13 @@ class ProjectionLayer(nn.Module):
             found,
             tolerance=self.tolerance,
             most=self.newton_steps,
-            products=self.products,
+            products=self.rule.products,
         )
         if info.point.fault:
-            self._complain(info.point.fault)
+            self.rule.complain(info.point.fault)
         else:
             found = info.point.blocks
-        call = _Call(self, problem, found, list(parameters), info)
-        values = _Minimiser.apply(call, *inputs)  # type: ignore[no-untyped-call]
-        return dict(zip(blocks, values, strict=True)), info
+        return Minimum(self.rule, self.terms, problem, found, info).as_function_of(parameters, blocks), info
 
     def _problem_with(self, parameters: dict[str, Tensor]) -> GuidedProjection:
         terms = self.terms(parameters)
@@ -203,95 +184,3 @@ class ProjectionLayer(nn.Module):
 
     def _asked(self) -> str | LinearSolver:
         return "auto" if self.settings is None else self.settings.solver
-
-    def _fault_of(self, found: AdjointSolution) -> str:
-        if self.backward_by == "unroll":
-            return "" if found.remainder <= 1.0 else "Gauss-Newton steps move away from this end; take 'implicit'"
-        if found.remainder <= _LAX * self.accuracy:
-            return ""
-        return "the curvature of the merit is not positive" if not found.lowest > 0.0 else "allow more products"
-
-    def _complain(self, fault: str) -> None:
-        message = f"the solve ended where it has no derivative: {fault}"
-        if self.on_fault == "error":
-            raise DerivativeError(message)
-        warnings.warn(message + "; its Gauss-Newton matrix is used in place of it", stacklevel=5)
-
-
-@dataclass(frozen=True)
-class _Call:
-    """All that the backward pass of one solve needs."""
-
-    layer: ProjectionLayer
-    problem: Problem
-    found: dict[str, Tensor]
-    names: list[str]
-    info: LayerInfo
-
-    def pulled_back(self, cotangents: Sequence[Tensor], values: Sequence[Tensor]) -> list[Tensor | None]:
-        """Gradients of the parameters, then of the blocks of the start."""
-        layer, layout, free = self.layer, self.problem.layout, self.problem.structure.free
-        with torch.enable_grad():
-            given = [value.detach().requires_grad_(value.is_floating_point()) for value in values]
-            terms = list(layer.terms(dict(zip(self.names, given, strict=True))))
-        merit = MeritDerivatives(layout, terms, self.found, free)
-        right = layout.flatten(dict(zip(layout.sizes, cotangents, strict=True)))
-        precondition = Preconditioner(self.problem.solved_by(layer.solver), self.found)
-        multiplier = self._solve(merit, precondition, right * free)
-        start = torch.where(free, 0.0, right - merit.product(multiplier))
-        slopes: list[Tensor | None] = [None] * len(given)
-        wanted = [number for number, value in enumerate(given) if value.requires_grad]
-        if wanted and merit.gradient.requires_grad:
-            for number, slope in zip(wanted, merit.pulled_back(-multiplier, [given[n] for n in wanted]), strict=True):
-                slopes[number] = torch.zeros_like(given[number]) if slope is None else slope
-        return [*slopes, *layout.unflatten(start).values()]
-
-    def _solve(self, merit: MeritDerivatives, precondition: Preconditioner, right: Tensor) -> Tensor:
-        layer = self.layer
-        faulty = self.info.point is not None and bool(self.info.point.fault)
-        if faulty:
-            found = stationary(merit.free_product, precondition, right, 1)
-        elif layer.backward_by == "unroll":
-            found = stationary(merit.free_product, precondition, right, layer.unrolled_steps)
-        else:
-            found = conjugate(merit.free_product, precondition, right, layer.accuracy, layer.products)
-        self.info.adjoint = found
-        fault = "" if faulty else layer._fault_of(found)
-        if fault:
-            layer._complain(f"the adjoint equations are left at {found.remainder:.1e} of their right side: {fault}")
-            return precondition(right)
-        return found.values
-
-
-class _Minimiser(Function):
-    """``(call, *parameters, *start) -> blocks``."""
-
-    @staticmethod
-    def forward(ctx: Any, call: _Call, *inputs: Tensor) -> tuple[Tensor, ...]:
-        ctx.call = call
-        ctx.save_for_backward(*inputs)
-        return tuple(block.clone() for block in call.found.values())
-
-    @staticmethod
-    def backward(ctx: Any, *cotangents: Tensor) -> tuple[Tensor | None, ...]:
-        inputs = ctx.saved_tensors
-        with torch.no_grad():
-            slopes = ctx.call.pulled_back([c.detach() for c in cotangents], inputs[: len(ctx.call.names)])
-        if torch.is_grad_enabled():
-            slopes = [None if s is None else _Once.apply(s, *cotangents, *inputs) for s in slopes]  # type: ignore[no-untyped-call]
-        return (None, *slopes)
-
-
-class _Once(Function):
-    """A gradient that says why it cannot be differentiated again."""
-
-    @staticmethod
-    def forward(ctx: Any, slope: Tensor, *others: Tensor) -> Tensor:
-        return slope.clone()
-
-    @staticmethod
-    def backward(ctx: Any, *cotangents: Tensor) -> tuple[None, ...]:
-        raise DerivativeError(
-            "second derivatives of a solve are not there: the backward pass of ProjectionLayer is differentiable once. "
-            "Take finite differences of its gradients, or leave out create_graph=True"
-        )

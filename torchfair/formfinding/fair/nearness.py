@@ -9,11 +9,13 @@ import torch
 from torch import Tensor
 
 from ... import constraints as c
-from ...geometry import closest_on, face_centres
+from ...constraints.closeness import Feet
+from ...geometry import ReferenceSurface, closest_on, face_centres
 from ...geometry.reference import Reference
 from ...projection import ElementTerm
 from ...projection.layout import State
 from ...topology import Topology
+from ..differentiable.traced_planes import TracedPlanes
 from ..job.pulls import Pulls
 from ..references import GivenReference, distances_from, surface_of
 from .gliding_boundary import GlidingBoundary
@@ -71,7 +73,12 @@ class Nearness:
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""
-        self._planes = c.TangentPlanes(self.surface)
+        self._planes: Feet = c.TangentPlanes(self.surface)
+
+    def trace(self, vertices: Tensor) -> None:
+        """Makes planes from now on differentiable functions of the vertices (R, 3) of the surface, a mesh."""
+        assert isinstance(self.surface, ReferenceSurface)
+        self._planes = TracedPlanes(self.surface, vertices)
 
     # ---- decisions -------------------------------------------------------------------------------------
 

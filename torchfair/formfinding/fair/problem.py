@@ -83,17 +83,26 @@ class FairProblem:
         self.loose = self._loose_corners()
         self.boundary = self._gliding_boundary()
         self.most_warped, self.distance_for_planarity = math.inf, 0.0
-        limit = settings.distance_limit
-        self.near = Nearness(
-            vertices,
-            topology,
-            reference or (vertices, topology),
-            pulls,
+        self.near = self._nearness(reference or (vertices, topology))
+
+    def _nearness(self, reference: GivenReference) -> Nearness:
+        limit = self.settings.distance_limit
+        return Nearness(
+            self.vertices,
+            self.topology,
+            reference,
+            self.pulls,
             self.boundary,
-            limit=None if limit is None else limit * input_edge,
-            input_edge=input_edge,
+            limit=None if limit is None else limit * self.input_edge,
+            input_edge=self.input_edge,
             notes=self.notes,
         )
+
+    def take_reference(self, reference: GivenReference) -> None:
+        """Another surface to stay close to, normalised."""
+        self._has_other_reference, self.near_input = True, False
+        self.near = self._nearness(reference)
+        self.reconsider()
 
     def take_settings(self, settings: FairSettings) -> None:
         """Takes other weights."""

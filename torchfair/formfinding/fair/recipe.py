@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from torch import Tensor
 
-from ...errors import MeshError
+from ...errors import MeshError, SettingsError
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ...settings.fair_settings import FairSettings
@@ -112,6 +112,27 @@ class FairRecipe(Recipe[FairSettings]):
         self.problem.near.take_up(self.placed(state))
         settings = replace(self.settings.projection, least_extrapolation=math.inf, least_uncorrected_gain=0.0)
         return self.problem.stage(state, 1.0, 1.0, settings)
+
+    def final(self, state: State) -> Stage:
+        """Everything at once, with the sharp absolute value."""
+        if self.settings.formulation != "reduced":
+            raise SettingsError(f"formulation {self.settings.formulation!r} has no layer: take 'reduced'")
+        self.problem.near.take_up(self.placed(state))
+        return self.problem.stage(state, 1.0, 1.0, self.settings.projection)
+
+    @property
+    def glides(self) -> bool:
+        """Along boundary and creases, as the settings say."""
+        return self.problem.boundary is not None and self.problem.boundary.feet is not None
+
+    def take_reference(self, reference: tuple[Tensor, Topology]) -> None:
+        """In place of the one before."""
+        self.reference = reference
+        self.problem.take_reference(normalised_reference(reference, self.unit))
+
+    def trace_reference(self, vertices: Tensor) -> None:
+        """Closest points, and the planes there, follow the vertices (R, 3)."""
+        self.problem.near.trace(self.unit.apply(vertices))
 
     def blocks(self, vertices: Tensor) -> State:
         """With auxiliary variables that fit."""

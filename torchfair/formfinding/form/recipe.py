@@ -26,6 +26,7 @@ from .plan import FormPlan
 from .problem import FormProblem, staying_vertices
 from .rim import Rim, check_rim
 from .several_starts import FAR, SeveralStarts
+from .stages import in_space
 
 
 class FormRecipe(Recipe[FormSettings]):
@@ -97,6 +98,20 @@ class FormRecipe(Recipe[FormSettings]):
     def follower(self, state: State) -> Stage:
         """In space, with the last smoothing."""
         return self._follower.stage(state)
+
+    def final(self, state: State) -> Stage:
+        """In space, with the last smoothing and with fairness as the surface of the state asks for it."""
+        if self.settings.formulation != "reduced":
+            raise SettingsError(f"formulation {self.settings.formulation!r} has no layer: take 'reduced'")
+        if self.problem.has_tangent_planes:
+            raise SettingsError("prescribed normals have no layer: the job ends with patches that it freezes")
+        self.pulls.aim(1.0, state["vertices"])
+        return in_space(self.problem, state["vertices"], self.settings.smoothing, self.settings.projection)
+
+    @property
+    def glides(self) -> bool:
+        """The boundary, if the settings say so."""
+        return self.problem.glides
 
     def settling(self, state: State, damping: float | None) -> SettlingPlan:
         """From where the surface is and from the start, whichever is better."""

@@ -49,6 +49,11 @@ class Pulls:
         self.version += changes or not self.everywhere
         self.pulled[vertices], self.held[vertices] = True, False
 
+    def trace(self, places: Tensor) -> None:
+        """Pulls the vertices that are pulled to ``places`` (n, 3), of which terms are differentiable functions."""
+        self.targets = self.targets.index_put((self.vertices,), places)
+        self.aims = self.targets
+
     def hold(self, vertices: Tensor) -> None:
         """Keeps ``vertices`` (n,) where they are, also those that were pulled."""
         self.version += 1

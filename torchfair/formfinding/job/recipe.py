@@ -9,7 +9,7 @@ from typing import ClassVar, Generic, Protocol, TypeVar
 import torch
 from torch import Tensor
 
-from ...errors import MeshError
+from ...errors import MeshError, SettingsError
 from ...normalisation import Normalisation
 from ...projection import ProjectionResult, ProjectionSettings
 from ...projection.layout import State
@@ -95,6 +95,14 @@ class Recipe(ABC, Generic[S]):
         """
         return OneStage(at_rest(self.follower(state), damping))
 
+    def final(self, state: State) -> Stage:
+        """What the finished mesh is the minimum of, from a state near it on; for :class:`JobLayer`.
+
+        Raises:
+            SettingsError: the job, or its settings, end otherwise.
+        """
+        raise SettingsError(f"the job '{self.name}' does not end in a minimum that could be differentiated")
+
     def state(self) -> State:
         """Variable blocks at the start."""
         return self.blocks(self.start)
@@ -124,6 +132,22 @@ class Recipe(ABC, Generic[S]):
     def fixed(self) -> dict[str, Tensor]:
         """Mask of the unknowns of vertices that do not move."""
         return {"vertices": self.stays() | self.pulls.held}
+
+    @property
+    def glides(self) -> bool:
+        """Whether some vertices glide on curves, on which the mesh of a state has them exactly."""
+        return False
+
+    def take_reference(self, reference: tuple[Tensor, Topology]) -> None:
+        """Takes another mesh, in the unit of the input, for the surface to stay close to; before a plan is made.
+
+        Raises:
+            SettingsError: the job knows no reference.
+        """
+        raise SettingsError(f"the job '{self.name}' has no reference surface")
+
+    def trace_reference(self, vertices: Tensor) -> None:
+        """Makes terms from now on differentiable functions of the vertices (R, 3) of the reference that was taken."""
 
     def take_settings(self, settings: S) -> None:
         """Other weights, of the same kind."""

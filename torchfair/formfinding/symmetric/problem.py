@@ -11,14 +11,16 @@ import torch
 from torch import Tensor
 
 from ... import constraints as c
+from ...constraints.closeness import Feet
 from ...constraints.saddle_sides import SaddleSides
-from ...geometry import corner_angles
+from ...geometry import ReferenceSurface, corner_angles
 from ...geometry.reference import Reference
 from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...settings.symmetric_settings import SymmetricSettings
+from ..differentiable.traced_planes import TracedPlanes
 from ..face_guard import FaceGuard
 from ..job.plan import Stage
 from ..job.pulls import Pulls
@@ -26,6 +28,7 @@ from .kept_shape import KeptShape, Missed
 
 _SAFE_ANGLE = 2.5  # smallest angles at which the barrier sets in
 _KEPT_ENERGY = 0.01  # weight of E over that of the shape that is kept: vertices slide to where E is low
+_MET = 1e6  # weight at which conditions hold to 1e-8 or so
 _KEPT_MARGIN = 0.1  # share of the margin of saddle sides that is kept where conditions are met exactly
 
 
@@ -35,6 +38,7 @@ class Aim(Enum):
     SEARCH = "conditions, saddle sides and everything else, weighted; stars may turn into others"
     SHAPE = "the same, stars stay what they are"
     TIGHT = "the same as SHAPE with conditions weighted more"
+    MINIMUM = "the same as SHAPE with conditions weighted so much that they are met as promised"
     EXACT = "conditions and saddle sides alone"
     CONDITIONS = "conditions alone"
 
@@ -110,9 +114,20 @@ class SymmetricProblem:
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""
-        self._planes = None if self._reference is None else c.TangentPlanes(self._reference)
+        self._planes: Feet | None = None if self._reference is None else c.TangentPlanes(self._reference)
         self._shape: KeptShape | None = None
         self._kept: dict[tuple[object, SymmetricSettings], list[ElementTerm]] = {}
+
+    def take_reference(self, reference: ReferenceSurface) -> None:
+        """Another surface to stay close to, normalised."""
+        self._reference = reference
+        self.forget()
+
+    def trace_reference(self, vertices: Tensor) -> None:
+        """Makes terms from now on differentiable functions of the vertices (R, 3) of the surface, a mesh."""
+        assert isinstance(self._reference, ReferenceSurface)
+        self.forget()
+        self._planes = TracedPlanes(self._reference, vertices)
 
     def _kept_shape(self) -> KeptShape:
         if self._shape is None:
@@ -169,7 +184,8 @@ class SymmetricProblem:
     def terms(self, aim: Aim) -> list[ElementTerm]:
         """Element terms of an aim."""
         settings = self.settings
-        weight = settings.tight_weight if aim is Aim.TIGHT else settings.constraint_weight
+        tight, most = settings.tight_weight, max(_MET, settings.tight_weight)
+        weight = {Aim.TIGHT: tight, Aim.MINIMUM: most}.get(aim, settings.constraint_weight)
         conditions = self._conditions(weight)
         if aim is Aim.CONDITIONS:
             return conditions

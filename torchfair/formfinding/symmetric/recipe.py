@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from ...errors import MeshError
+from ...errors import MeshError, SettingsError
+from ...geometry import ReferenceSurface
 from ...principal import PrincipalEdges
 from ...principal.principal_edges import PrincipalStars
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ...settings.symmetric_settings import SymmetricSettings
+from ...topology import Topology
 from ..job import JobResult, Level, OneStage, Plan, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference, surface_of
 from .changes import Changes
@@ -118,6 +120,24 @@ class SymmetricRecipe(Recipe[SymmetricSettings]):
         self.problem.sides.decide(state["vertices"])
         settings = replace(self.settings.projection, least_extrapolation=math.inf)
         return self.problem.stage(state, Aim.SHAPE, settings)
+
+    def final(self, state: State) -> Stage:
+        """The best shape among those that meet the conditions; what stars are to be is decided where the state is."""
+        if self.settings.formulation == "lifted":
+            raise SettingsError("formulation 'lifted' has no layer: take 'spheres' or 'eliminated'")
+        self.problem.pull_fully()
+        self.problem.sides.decide(state["vertices"])
+        return self.problem.stage(state, Aim.MINIMUM, self.settings.projection)
+
+    def take_reference(self, reference: tuple[Tensor, Topology]) -> None:
+        """In place of the one before."""
+        self.reference = reference
+        vertices, topology = reference
+        self.problem.take_reference(ReferenceSurface(self.unit.apply(vertices), topology))
+
+    def trace_reference(self, vertices: Tensor) -> None:
+        """Closest points, and the planes there, follow the vertices (R, 3)."""
+        self.problem.trace_reference(self.unit.apply(vertices))
 
     def settling(self, state: State, damping: float | None) -> Plan:
         """Conditions and saddle sides to rounding, from the shape on; if that fails, the whole job."""

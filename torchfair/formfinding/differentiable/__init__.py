@@ -1,0 +1,1 @@
+"""Finished meshes as differentiable functions of what jobs are given."""
