@@ -31,7 +31,7 @@ class Descent(NamedTuple):
         blocks: There.
         steps: Taken or refused.
         products: Products with the exact second derivatives.
-        arrived: Whether the last step was short enough, undamped.
+        arrived: Whether the next step is short enough, or promises less than can be computed.
         refused: Whether the last step was refused by the guard.
     """
 
@@ -78,7 +78,8 @@ def descended(
         accuracy = min(_ROUGHLY, math.sqrt(size / math.sqrt(merit))) if merit > 0.0 else _ROUGHLY
         step = _steihaug(local.free_product, precondition, gradient, radius, accuracy)
         products += step.products
-        if not step.at_edge and local.relative_length(step.change) <= tolerance:
+        promises_nothing = -step.predicted <= torch.finfo(gradient.dtype).eps * abs(merit)
+        if not step.at_edge and (promises_nothing or local.relative_length(step.change) <= tolerance):
             return Descent(state, number, products, True, False)
         trial = layout.unflatten(layout.flatten(state) + step.change)
         there = _merit(problem, trial)

@@ -18,10 +18,12 @@ from ...projection.newton import Descent, descended
 from ...projection.stationary_point import polished
 from ..job import Recipe, Session, Stage
 from ..job.compiled_problems import CompiledProblems
-from .parameters import VERTICES, JobParameters
+from .parameters import SEEN_FROM, VERTICES, JobParameters
 from .placing import placed
 
 _SURE = 2  # Newton steps without a region at the end
+_ROUNDS, _SEEN = 12, 10.0  # until a mesh sees itself; times the tolerance
+_LINKS = 3  # of what it sees itself from, backwards; each counts for a hundredth of the last one, or less
 
 
 class Finish(NamedTuple):
@@ -89,9 +91,7 @@ class FinishedMesh:
         else:
             session.state = self._near(start)
         with torch.no_grad():
-            self._stage = recipe.final(session.state)
-            self._problem = problems.of(replace(self._stage, version=object()))
-            self.info = self._brought_down(session.runs, finish)
+            self._bring_down(session, finish, problems)
 
     @property
     def vertices(self) -> Tensor:
@@ -108,7 +108,13 @@ class FinishedMesh:
             start = parameters[VERTICES].to("cpu", torch.float64)
             blocks["vertices"] = self._recipe.unit.apply(start)
         minimum = Minimum(rule, lambda values: given.terms(stage, values), self._problem, found, self.info)
-        return self._mesh(minimum.as_function_of(others, blocks), start)
+        if not self._recipe.sees_itself:
+            return self._mesh(minimum.as_function_of(others, blocks), start)
+        for _ in range(_LINKS):
+            blocks = {**found, "vertices": blocks["vertices"]}
+            seen = minimum.as_function_of({**others, SEEN_FROM: blocks["vertices"]}, blocks)
+            blocks = {**seen, "vertices": seen["vertices"]}
+        return self._mesh(blocks, start)
 
     def _near(self, start: Tensor) -> State:
         """Blocks at a mesh (V, 3), with what stays where it stays."""
@@ -117,14 +123,24 @@ class FinishedMesh:
             raise ShapeError("start", f"{tuple(recipe.given.shape)}", tuple(there.shape))
         return recipe.state_at(torch.where(recipe.fixed["vertices"][:, None], self._given.start, there))
 
-    def _brought_down(self, runs: list[ProjectionResult], finish: Finish) -> JobLayerInfo:
-        stage, problem = self._stage, self._problem
-        descent = descended(problem, stage.blocks, guard=stage.guard, tolerance=finish.tolerance, most=finish.steps)
-        point = polished(
-            problem, problem.terms, descent.blocks, tolerance=finish.tolerance, most=_SURE, products=finish.products
-        )
-        fault = _fault(problem, stage, descent, point)
-        return JobLayerInfo(runs, descent.steps, descent.products, replace(point, fault=fault))
+    def _bring_down(self, session: Session[Any], finish: Finish, problems: CompiledProblems) -> None:
+        """To the minimum; where terms are seen from the mesh itself, until they are seen from the minimum."""
+        recipe, state, steps, products = self._recipe, session.state, 0, 0
+        for number in range(_ROUNDS):
+            self._stage = stage = recipe.final(state)
+            self._problem = problem = problems.of(replace(stage, version=object()))
+            descent = descended(problem, stage.blocks, guard=stage.guard, tolerance=finish.tolerance, most=finish.steps)
+            steps, products = steps + descent.steps, products + descent.products
+            point = polished(
+                problem, problem.terms, descent.blocks, tolerance=finish.tolerance, most=_SURE, products=finish.products
+            )
+            fault = _fault(problem, stage, descent, point)
+            if fault or not recipe.sees_itself or _moved(stage.blocks, point.blocks) <= _SEEN * finish.tolerance:
+                break
+            state = point.blocks
+            if number == _ROUNDS - 1:
+                fault = "smoothing and fairness are seen from the mesh, which does not settle: raise fairness"
+        self.info = JobLayerInfo(session.runs, steps, products, replace(point, fault=fault))
 
     def _mesh(self, blocks: State, start: Tensor) -> Tensor:
         """(V, 3) in the unit of the input; what stays is exactly where the ``start`` (V, 3) has it."""
@@ -140,6 +156,12 @@ def copied(recipe: Recipe[Any]) -> Recipe[Any]:
     """The same job, which shares nothing with it that solving could change."""
     shared = [recipe.topology, getattr(recipe, "reference", None)]
     return copy.deepcopy(recipe, {id(part): part for part in shared})
+
+
+def _moved(before: State, after: State) -> float:
+    """Largest change of a coordinate, relative to the extent."""
+    vertices = before["vertices"]
+    return float((after["vertices"] - vertices).abs().max() / (vertices.amax(0) - vertices.amin(0)).max())
 
 
 def _fault(problem: GuidedProjection, stage: Stage, descent: Descent, point: StationaryPoint) -> str:

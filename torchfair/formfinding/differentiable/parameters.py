@@ -14,6 +14,7 @@ from ...projection import ElementTerm
 from ..job import Recipe, Stage
 
 TARGETS, VERTICES, REFERENCE = "targets", "vertices", "reference"
+SEEN_FROM = "seen from"  # the finished mesh itself, normalised, where terms depend on it
 _WEIGHT = "_weight"
 _APART = 1e-3  # relative: weights on both sides of a given one; the merit is affine in it
 
@@ -60,7 +61,7 @@ class JobParameters:
             recipe.pulls.trace(recipe.unit.apply(traced[TARGETS]))
         if REFERENCE in traced:
             recipe.trace_reference(traced[REFERENCE])
-        terms = list(stage.terms())
+        terms = list(stage.terms() if SEEN_FROM not in traced else recipe.terms_seen_from(stage, traced[SEEN_FROM]))
         for name, weight in traced.items():
             if name.endswith(_WEIGHT):
                 terms = self._weighed(stage, terms, name, weight)
@@ -96,7 +97,7 @@ class JobParameters:
 
     def _weighed(self, stage: Stage, terms: list[ElementTerm], name: str, weight: Tensor) -> list[ElementTerm]:
         """The terms with their weights as functions of one weight of the settings, on which nothing else depends."""
-        recipe, value = self.recipe, float(weight)
+        recipe, value = self.recipe, float(weight.detach())
         settings, sides = recipe.settings, []
         for sign in (1.0, -1.0):
             recipe.take_settings(replace(settings, **{name: value * (1.0 + sign * _APART)}))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import torch
@@ -17,7 +19,7 @@ from ...geometry.spline_curves import SplineCurves
 from ...linear import Factor, factorise
 from ...measuring.trust import LARGEST_DIHEDRAL
 from ...normalisation import Normalisation
-from ...projection import ElementTerm, LogAbsolute, SmoothAbsolute
+from ...projection import ElementTerm, LogAbsolute, SmoothAbsolute, SmoothNuclearNorm
 from ...settings.form_settings import FormSettings
 from ...topology import Topology
 from ..job.pulls import Pulls
@@ -134,6 +136,13 @@ class FormProblem:
             absolute=LogAbsolute if settings.absolute_value == "logarithmic" else SmoothAbsolute,
         )
         return [*lifted, *others]
+
+    def traced_terms(self, vertices: Tensor, fraction: float) -> list[ElementTerm]:
+        """The same for the smoothing of that fraction, as differentiable functions of the vertices (V, 3)."""
+        mean = total_absolute_curvature(vertices, self.topology) / max(1, self.topology.num_vertices)
+        smoothing = (fraction * mean).clamp_min(_LEAST_SMOOTHING)
+        terms = self.terms(vertices, float(smoothing.detach()))
+        return [_smoothed(term, smoothing) if isinstance(term.loss, SmoothNuclearNorm) else term for term in terms]
 
     @property
     def fixed_in_space(self) -> Tensor:
@@ -267,3 +276,10 @@ def _total(terms: Sequence[ElementTerm], vertices: Tensor) -> float:
     """What the terms contribute to the merit at vertices (V, 3)."""
     arguments = [(term, term.arguments({"vertices": vertices})) for term in terms]
     return sum(float(term.contributions(data, term.values(data)).sum()) for term, data in arguments)
+
+
+def _smoothed(term: ElementTerm, smoothing: Tensor) -> ElementTerm:
+    """The term with a smoothing () that it is a differentiable function of."""
+    loss = copy.copy(term.loss)
+    object.__setattr__(loss, "epsilon", smoothing)  # which checks itself as a number
+    return replace(term, loss=loss)

@@ -10,7 +10,7 @@ from torch import Tensor
 from ...curves import ClosedCurve
 from ...energies import total_absolute_curvature
 from ...errors import MeshError, SettingsError
-from ...projection import Callback, ProjectionResult
+from ...projection import Callback, ElementTerm, ProjectionResult
 from ...projection.layout import State
 from ...settings.form_settings import FormSettings
 from ...subdivision import catmull_clark, loop
@@ -107,6 +107,12 @@ class FormRecipe(Recipe[FormSettings]):
             raise SettingsError("prescribed normals have no layer: the job ends with patches that it freezes")
         self.pulls.aim(1.0, state["vertices"])
         return in_space(self.problem, state["vertices"], self.settings.smoothing, self.settings.projection)
+
+    sees_itself = True
+
+    def terms_seen_from(self, stage: Stage, vertices: Tensor) -> list[ElementTerm]:
+        """With smoothing and the even part of fairness as functions of them."""
+        return self.problem.traced_terms(vertices, self.settings.smoothing)
 
     @property
     def glides(self) -> bool:

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ...errors import MeshError, SettingsError
 from ...normalisation import Normalisation
-from ...projection import ProjectionResult, ProjectionSettings
+from ...projection import ElementTerm, ProjectionResult, ProjectionSettings
 from ...projection.layout import State
 from ...topology import Topology
 from ..checks import one_start, refuse_degenerate_faces
@@ -102,6 +102,13 @@ class Recipe(ABC, Generic[S]):
             SettingsError: the job, or its settings, end otherwise.
         """
         raise SettingsError(f"the job '{self.name}' does not end in a minimum that could be differentiated")
+
+    sees_itself: ClassVar[bool] = False
+    """Whether terms of :meth:`final` depend on the mesh of the state, as on what fairness finds even there."""
+
+    def terms_seen_from(self, stage: Stage, vertices: Tensor) -> Sequence[ElementTerm]:
+        """Terms of a final stage as differentiable functions of the vertices (V, 3), normalised, they are seen from."""
+        return stage.terms()
 
     def state(self) -> State:
         """Variable blocks at the start."""
