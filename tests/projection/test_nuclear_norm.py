@@ -69,3 +69,29 @@ def test_a_flat_star_has_no_cost_and_a_finite_model() -> None:
     # Frames are arbitrary there, the model is not: |W|^2 / (2 epsilon).
     other = symmetric_components(matrices(0, count=3))
     torch.testing.assert_close(model(loss, nothing, other), other.square().sum(1) / 0.02)
+
+
+def second_derivatives(loss: object, residuals: Tensor, way: Tensor) -> tuple[Tensor, Tensor]:
+    """Gradient (n, 6), and second derivatives along a way (n, 6)."""
+    there = residuals.clone().requires_grad_()
+    (slope,) = torch.autograd.grad(loss.value(there).sum(), there, create_graph=True)
+    (bend,) = torch.autograd.grad((slope * way).sum(), there)
+    return slope.detach(), bend
+
+
+def test_second_derivatives_are_finite_where_eigenvalues_coincide() -> None:
+    """Those of eigenvalues where these differ; differences of the gradient where two or three are equal."""
+    norm = SmoothNuclearNorm(0.3)
+    generator = torch.Generator().manual_seed(5)
+    residuals, way = (torch.randn(6, 6, generator=generator, dtype=torch.float64) for _ in range(2))
+    twice = norm.twice_differentiable()
+    torch.testing.assert_close(twice.value(residuals), norm.value(residuals), rtol=1e-13, atol=0.0)
+    for found, expected in zip(*(second_derivatives(f, residuals, way) for f in (twice, norm)), strict=True):
+        torch.testing.assert_close(found, expected, rtol=1e-10, atol=1e-12)
+    ray = torch.tensor([0.4, -0.2, 0.9], dtype=torch.float64)
+    line = symmetric_components(ray[:, None] * ray)
+    sizes = torch.tensor([1.0, 0.0, 1e-9, -1.0, 1e3, 1e-30], dtype=torch.float64)
+    for equal in (sizes[:, None] * line, sizes[:, None] * symmetric_components(torch.eye(3, dtype=torch.float64))):
+        _, bend = second_derivatives(twice, equal, way)
+        sides = [second_derivatives(twice, equal + sign * 1e-6 * way, way)[0] for sign in (1.0, -1.0)]
+        torch.testing.assert_close(bend, (sides[0] - sides[1]) / 2e-6, rtol=1e-6, atol=1e-7)

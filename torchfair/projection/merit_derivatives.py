@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -10,6 +11,7 @@ from torch import Tensor
 from .differentiation import as_rows
 from .element_function import mapped
 from .layout import Layout, State
+from .nuclear_norm import SmoothNuclearNorm
 from .term import ElementTerm
 
 _STEP = 0.03  # of a central difference: times the cube root of eps and the extent of the blocks
@@ -30,7 +32,7 @@ class MeritDerivatives:
 
     def __init__(self, layout: Layout, terms: Sequence[ElementTerm], state: State, free: Tensor) -> None:
         self._layout, self._free = layout, free
-        self._terms = [term for term in terms if term.num_elements]
+        self._terms = [_twice_differentiable(term) for term in terms if term.num_elements]
         self._refreshed = [term for term in self._terms if term.refresh is not None]
         with torch.enable_grad():
             self._flat = layout.flatten({name: block.detach() for name, block in state.items()}).requires_grad_()
@@ -85,6 +87,11 @@ def _gradient(layout: Layout, terms: Sequence[ElementTerm], flat: Tensor, search
     slope: Tensor
     (slope,) = torch.autograd.grad(merit, flat, create_graph=True, allow_unused=True, materialize_grads=True)
     return slope
+
+
+def _twice_differentiable(term: ElementTerm) -> ElementTerm:
+    loss = term.loss
+    return replace(term, loss=loss.twice_differentiable()) if isinstance(loss, SmoothNuclearNorm) else term
 
 
 def _extent(block: Tensor) -> Tensor:

@@ -15,6 +15,7 @@ from .problem import Problem
 from .stationary_point import Preconditioner
 from .trials import Guard
 
+_FIRST = 4.0  # radius, over the length of a Gauss-Newton step
 _PRODUCTS = 100  # in one step
 _ROUGHLY = 0.3  # accuracy of steps far from the minimum
 _GOOD, _POOR = 0.75, 0.25  # actual over predicted fall: the region grows above, shrinks below
@@ -74,7 +75,7 @@ def descended(
             gradient, precondition = local.gradient.detach() * free, Preconditioner(problem, state)
             size = math.sqrt(max(float(torch.dot(gradient, precondition(gradient))), 0.0))
         if not number:
-            radius = first = size
+            radius = first = _FIRST * size
         accuracy = min(_ROUGHLY, math.sqrt(size / math.sqrt(merit))) if merit > 0.0 else _ROUGHLY
         step = _steihaug(local.free_product, precondition, gradient, radius, accuracy)
         products += step.products
@@ -92,7 +93,7 @@ def descended(
         if gain > _LEAST_GAIN:
             state, merit, local = trial, there, None
         if radius <= _LEAST_RADIUS * first:
-            break
+            return Descent(state, number + 1, products, False, refused)
     return Descent(state, most, products, False, refused)
 
 
@@ -105,7 +106,7 @@ def _gain(before: float, after: float, step: _Step) -> float:
     """Actual over predicted fall; 1 where that is too small to be computed."""
     if not math.isfinite(after):
         return -1.0
-    if not step.at_edge and -step.predicted <= _ROUNDING * abs(before):
+    if -step.predicted <= _ROUNDING * abs(before):
         return 1.0
     return (after - before) / step.predicted if step.predicted < 0.0 else -1.0
 

@@ -46,6 +46,51 @@ class SmoothNuclearNorm(Rounded):
         weights = torch.sqrt(0.5 * (inverse[:, i] + inverse[:, j]))
         return weights[:, :, None] * _turned_basis(vectors)
 
+    def twice_differentiable(self) -> TwiceDifferentiableNorm:
+        """The same loss where second derivatives are asked for, which those of eigenvalues are no way to."""
+        return TwiceDifferentiableNorm(self)
+
+
+@dataclass(frozen=True)
+class TwiceDifferentiableNorm:
+    r"""The values of a :class:`SmoothNuclearNorm`, with exact first and second derivatives, also of equal eigenvalues.
+
+    Torch divides by differences of eigenvalues, which vanish for stars with one bent edge. Here, in the eigenvectors of
+    a matrix, changes W of it count for ``sum_i f(k_i) + f'(k_i) W_ii + sum_ij f'[k_i, k_j] W_ij^2 / 2``, with divided
+    differences of f' (Daleckii and Krein 1965). Third derivatives are not those of the norm.
+
+    Attributes:
+        norm: The loss.
+    """
+
+    norm: SmoothNuclearNorm
+
+    def value(self, residuals: Tensor) -> Tensor:
+        """Smoothed nuclear norms (n,)."""
+        matrices, epsilon = symmetric_matrix(residuals), self.norm.epsilon
+        values, vectors = torch.linalg.eigh(matrices.detach())
+        roots = torch.sqrt(values.square() + epsilon**2)
+        change = vectors.mT @ matrices @ vectors - torch.diag_embed(values)
+        diagonal: Tensor = torch.diagonal(change, dim1=-2, dim2=-1)
+        first = values.square() / (roots + epsilon) + values / roots * diagonal
+        norms: Tensor = first.sum(1) + 0.5 * (_divided(values, roots, epsilon) * change.square()).sum((1, 2))
+        return norms
+
+    def root(self, residuals: Tensor) -> Tensor:
+        """As that of the norm."""
+        return self.norm.root(residuals)
+
+
+def _divided(values: Tensor, roots: Tensor, epsilon: float) -> Tensor:
+    """(n, 3, 3) divided differences of ``k / sqrt(k^2 + epsilon^2)`` between eigenvalues, without cancellation."""
+    a, b = values[:, :, None], values[:, None, :]
+    root_a, root_b = roots[:, :, None], roots[:, None, :]
+    between, apart = a * root_b + b * root_a, a - b
+    alike = epsilon**2 * (a + b) / (root_a * root_b * torch.where(between != 0.0, between, 1.0))
+    alike = torch.where((a == 0.0) & (b == 0.0), epsilon**2 / (root_a * root_b * torch.maximum(root_a, root_b)), alike)
+    unlike = (a / root_a - b / root_b) / torch.where(apart != 0.0, apart, 1.0)
+    return torch.where(a * b >= 0.0, alike, unlike)
+
 
 def symmetric_components(matrix: Tensor) -> Tensor:
     """Six components (..., 6) of the symmetric part of matrices (..., 3, 3): the same norm, an isometry."""

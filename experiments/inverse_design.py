@@ -1,0 +1,321 @@
+"""Handles are found so that the finished mesh, which a whole job makes of them, does what is wanted.
+
+Two designs with hidden handles are made, and found again from what they do: a surface of least C from points that it
+passes through, a mesh of least E from pictures of stripes that it mirrors. What is wanted is a function of the finished
+mesh, the mesh a function of its handles (`JobLayer`): a quasi-Newton method (L-BFGS) finds these with gradients through
+the solve. The same method, from the same start, with gradients by implicit differentiation, by unrolling ten
+Gauss-Newton steps, and (for a few steps only) by finite differences.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from _charts import BLUE, GREEN, ORANGE, add_chart, add_legend
+from _common import ExperimentConfig, Report, Results, run_experiment, setting
+from _mirrors import Mirror, mirror_picture, panel_width, panels, striped
+from scipy.optimize import minimize
+from torch import Tensor
+
+from torchfair import Topology
+from torchfair.cameras import OrthographicCamera
+from torchfair.curves import ClosedCurve
+from torchfair.errors import DerivativeError
+from torchfair.formfinding import FairRecipe, FairSettings, FormRecipe, JobLayer, start_surface
+from torchfair.geometry import ReferenceSurface, vertex_normals
+from torchfair.reflection import Stripes, cone_directions, render_reflection
+from torchfair.shapes import Paraboloid, parameter_quads
+from torchfair.viewing import fit_camera
+from torchfair.viewing.sheet import Sheet
+
+NAME = "inverse_design"
+PICTURE, CHART = "reflections.png", "losses.png"
+MESHES = ("points_start.obj", "points_found.obj", "reflection_start.obj", "reflection_found.obj")
+IMPLICIT, UNROLLED, DIFFERENCES = "implicit", "unrolled", "finite differences"
+WAYS = (IMPLICIT, UNROLLED, DIFFERENCES)
+COLORS = {IMPLICIT: BLUE, UNROLLED: ORANGE, DIFFERENCES: GREEN}
+FREQUENCY = 1.0
+STRIPES = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], dtype=torch.float64)
+
+
+@dataclass(frozen=True)
+class Config(ExperimentConfig):
+    """Settings of the experiment."""
+
+    vertices: int = setting(80, "vertices of the surface of least C, about", least=40)
+    rows: int = setting(8, "cells along the mesh of least E", least=4)
+    handles: int = setting(2, "handles of each design", least=1)
+    points: int = setting(8, "points that the surface of least C is to pass through", least=1)
+    size: int = setting(64, "pixels along the pictures that are compared", least=16)
+    pull: float = setting(0.8, "how far hidden handles are pulled, in mean edges", least=0.01)
+    steps: int = setting(12, "steps of the method", least=1)
+    difference_steps: int = setting(4, "steps of it with finite differences", least=1)
+    difference: float = setting(1e-3, "finite differences, in mean edges", least=1e-12)
+    tolerance: float = setting(1e-6, "of finished meshes, relative to their extent", least=1e-12)
+
+
+# ---- what is wanted ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Design:
+    """A job with handles, where they are hidden, and what is wanted of the finished mesh.
+
+    Attributes:
+        name: Of the design.
+        recipe: With handles where they start.
+        hidden: (h, 3) targets that do what is wanted.
+        loss: Of the finished vertices; 0 at the hidden design.
+    """
+
+    name: str
+    recipe: FormRecipe | FairRecipe
+    hidden: Tensor
+    loss: Callable[[Tensor], Tensor]
+
+
+def hidden_places(vertices: Tensor, chosen: Tensor, reach: float) -> Tensor:
+    """Chosen vertices pulled up and sideways, each another way."""
+    turn = torch.arange(len(chosen), dtype=vertices.dtype) * 2.4
+    ways = torch.stack(
+        [0.3 * turn.cos(), 0.3 * turn.sin(), (1.0 + 0.5 * turn.sin()) * (-1.0) ** torch.arange(len(chosen))], 1
+    )
+    return vertices[chosen] + reach * ways
+
+
+def spread(vertices: Tensor, topology: Topology, count: int) -> Tensor:
+    """Inner vertices far from each other and from the boundary."""
+    chosen = torch.nonzero(topology.is_boundary_vertex).squeeze(1)
+    picked: list[int] = []
+    for _ in range(count):
+        picked.append(int(torch.cdist(vertices, vertices[chosen]).amin(1).argmax()))
+        chosen = torch.cat([chosen, torch.tensor(picked[-1:])])
+    return torch.tensor(sorted(picked))
+
+
+def through_points(config: Config) -> Design:
+    """A ring between two wavy curves, of least C; points where the faces of the hidden design have their centres."""
+    vertices, topology = start_surface([wavy_ring(2.0, 0.0), wavy_ring(0.7, 0.7)], config.vertices)
+    chosen = spread(vertices, topology, config.handles)
+    recipe = FormRecipe(vertices, topology, handles=dict(zip(chosen.tolist(), vertices[chosen].tolist(), strict=True)))
+    hidden = hidden_places(vertices, chosen, config.pull * recipe.unit.length)
+    mesh, _ = JobLayer(recipe)({"targets": hidden})
+    faces = torch.linspace(0, topology.num_faces - 1, config.points).long()
+    points, unit = mesh[topology.triangles[faces]].mean(1), recipe.unit.length
+
+    def loss(found: Tensor) -> Tensor:
+        """Mean squared distance of the points from the mesh, in mean edges squared."""
+        surface = ReferenceSurface(found, topology)
+        closest = surface.closest(points)
+        feet = (closest.weights[:, :, None] * found[surface.pieces[closest.pieces]]).sum(1)
+        return ((feet - points) / unit).square().sum(1).mean()
+
+    return Design("points", recipe, hidden, loss)
+
+
+def wavy_ring(radius: float, height: float) -> ClosedCurve:
+    turn = torch.arange(40, dtype=torch.float64) * 2 * math.pi / 40
+    return ClosedCurve(torch.stack([radius * turn.cos(), radius * turn.sin(), height + 0.15 * (2 * turn).sin()], dim=1))
+
+
+def mirroring(config: Config) -> Design:
+    """A mesh of quads over a saddle, of least E with its boundary fixed; pictures of the hidden design."""
+    mesh = parameter_quads(Paraboloid(0.6, -0.4), config.rows, config.rows)
+    vertices, topology = mesh.vertices, mesh.topology
+    chosen = spread(vertices, topology, config.handles)
+    handles = dict(zip(chosen.tolist(), vertices[chosen].tolist(), strict=True))
+    settings = FairSettings(boundary="fixed", smoothing=0.1, distance_limit=None, closeness_weight=0.0)
+    recipe = FairRecipe(vertices, topology, handles=handles, settings=settings)
+    hidden = hidden_places(vertices, chosen, config.pull * recipe.unit.length)
+    wanted, _ = JobLayer(recipe)({"targets": hidden})
+    camera = OrthographicCamera.fit(wanted, directions=cone_directions(torch.tensor([0.0, 0.0, 1.0]), 25.0, 4))
+    stripes = Stripes(STRIPES, FREQUENCY, 2.0)
+
+    def picture(found: Tensor) -> Tensor:
+        return render_reflection(
+            found, topology, camera, stripes, size=config.size, antialias=True, shading="smooth"
+        ).image
+
+    there = picture(wanted)
+    return Design("reflection", recipe, hidden, lambda found: (picture(found) - there).square().mean())
+
+
+# ---- finding it ----------------------------------------------------------------------------------------
+
+
+class Search:
+    """The loss of a design as a function of its handles, and its gradient one way or another.
+
+    Every mesh is finished from the last one that was finished, not by the whole job. Handles are told in mean edges
+    from where they start.
+    """
+
+    def __init__(self, design: Design, way: str, config: Config) -> None:
+        self.design, self.way, self.step = design, way, config.difference
+        backward = "unroll" if way == UNROLLED else "implicit"
+        self.layer = JobLayer(design.recipe, backward=backward, tolerance=config.tolerance)
+        self.targets = design.recipe.given[torch.tensor(list(design.recipe.handles))]
+        self.mesh, _ = self.layer({"targets": self.targets})
+        self.best, self.history, self.seconds = math.inf, [], time.process_time()
+        self.solves, self.faults, self.unit = 0, 0, design.recipe.unit.length
+
+    def __call__(self, places: np.ndarray) -> tuple[float, np.ndarray]:
+        at = torch.from_numpy(places).view(-1, 3)
+        try:
+            loss, slope = self.by_differences(at) if self.way == DIFFERENCES else self.by_layer(at)
+        except DerivativeError:  # too far: the method turns back
+            self.faults += 1
+            return 1e3 * (1.0 + self.history[0]["loss"]), np.zeros_like(places)
+        self.best = min(self.best, loss)
+        self.history.append({"loss": self.best, "seconds": time.process_time() - self.seconds, "solves": self.solves})
+        return loss, slope.numpy().ravel()
+
+    def finished(self, at: Tensor, start: Tensor) -> Tensor:
+        self.solves += 1
+        mesh, info = self.layer({"targets": self.targets + self.unit * at}, start=start)
+        if info.point.fault:
+            raise DerivativeError(info.point.fault)
+        return mesh
+
+    def by_layer(self, at: Tensor) -> tuple[float, Tensor]:
+        at = at.clone().requires_grad_()
+        mesh = self.finished(at, self.mesh)
+        loss = self.design.loss(mesh)
+        (slope,) = torch.autograd.grad(loss, at)
+        self.mesh = mesh.detach()
+        return float(loss.detach()), slope
+
+    def by_differences(self, at: Tensor) -> tuple[float, Tensor]:
+        """Forward differences, one mesh finished for every coordinate."""
+        with torch.no_grad():
+            self.mesh = self.finished(at, self.mesh)
+            loss, slope = float(self.design.loss(self.mesh)), torch.zeros_like(at)
+            for number in range(at.numel()):
+                there = at.clone()
+                there.view(-1)[number] += self.step
+                slope.view(-1)[number] = (float(self.design.loss(self.finished(there, self.mesh))) - loss) / self.step
+        return loss, slope
+
+
+def found_by(design: Design, way: str, config: Config) -> tuple[Report, Tensor]:
+    """What the method finds with gradients of a kind."""
+    search = Search(design, way, config)
+    start, unit = np.zeros(design.hidden.numel()), design.recipe.unit.length
+    begin = time.process_time()
+    search.seconds = begin
+    most = config.difference_steps if way == DIFFERENCES else config.steps
+    made = minimize(search, start, jac=True, method="L-BFGS-B", bounds=[(-2.5, 2.5)] * len(start),
+                    options={"maxiter": most, "maxfun": 2 * most, "gtol": 1e-9, "ftol": 1e-14})  # fmt: skip
+    seconds = time.process_time() - begin
+    targets = search.targets + unit * torch.from_numpy(made.x).view(-1, 3)
+    mesh, _ = JobLayer(design.recipe)({"targets": targets}, start=search.mesh)
+    return {
+        "first_loss": search.history[0]["loss"],
+        "loss": search.best,
+        "cpu_seconds": seconds,
+        "gradients": len(search.history),
+        "seconds_per_gradient": seconds / len(search.history),
+        "solves": search.solves,
+        "faults": search.faults,
+        "handles_off": float((targets - design.hidden).norm(dim=1).max()) / unit,
+        "mesh_off": float((mesh - wanted_mesh(design)).norm(dim=1).max()) / unit,
+        "history": search.history,
+    }, mesh
+
+
+def wanted_mesh(design: Design) -> Tensor:
+    """The finished hidden design."""
+    mesh, _ = JobLayer(design.recipe)({"targets": design.hidden})
+    return mesh
+
+
+def gradients_compared(design: Design, config: Config) -> Report:
+    """Errors of gradients at the start, relative to central differences of meshes finished again."""
+    slopes = {}
+    for way in (IMPLICIT, UNROLLED):
+        slopes[way] = Search(design, way, config).by_layer(torch.zeros_like(design.hidden))[1]
+    search = Search(design, DIFFERENCES, config)
+    exact = torch.zeros(design.hidden.numel(), dtype=torch.float64)
+    for number in range(len(exact)):
+        ends = []
+        for sign in (1.0, -1.0):
+            there = torch.zeros_like(design.hidden)
+            there.view(-1)[number] = sign * config.difference
+            ends.append(float(design.loss(search.finished(there, search.mesh))))
+        exact[number] = (ends[0] - ends[1]) / (2 * config.difference)
+    exact = exact.view_as(design.hidden)
+    return {way: float((slope - exact).norm() / exact.norm()) for way, slope in slopes.items()}
+
+
+# ---- pictures ------------------------------------------------------------------------------------------
+
+
+def draw_losses(designs: dict[str, Report], results: Results) -> None:
+    """The best loss so far over processor time, a chart for each design."""
+    sheet = Sheet(180 + 760 * len(designs), 700)
+    titles = {"points": "points on a surface of least $C$", "reflection": "stripes in a mesh of least $E$"}
+    for column, (name, report) in enumerate(designs.items()):
+        axes = add_chart(sheet, 170 + column * 760, 130, 600, 430, title=titles[name], x="seconds of one core",
+                         y="loss over that of the start" if column == 0 else "")  # fmt: skip
+        for way in WAYS:
+            rows = report[way]["history"]
+            axes.plot([row["seconds"] for row in rows], [row["loss"] / rows[0]["loss"] for row in rows],
+                      color=COLORS[way], label=way, marker="o", markersize=3)  # fmt: skip
+        axes.set_yscale("log")
+    add_legend(sheet.figure, handles=axes.get_lines(), loc="upper center", ncols=3)
+    sheet.write(results.path(CHART), overwrite=results.force)
+
+
+def draw_reflections(meshes: dict[str, Tensor], design: Design, config: Config, results: Results) -> None:
+    """Stripes of both directions in the start, what was found, and what was wanted."""
+    topology = design.recipe.topology
+    camera, pixels = fit_camera(
+        meshes["wanted"], towards_eye=torch.tensor([0.4, -0.5, 1.0]), up=torch.tensor([0.0, 0.0, 1.0]),
+        width=panel_width(config.width, len(meshes)), margin=0.02,
+    )  # fmt: skip
+    mirrors = [Mirror(mesh, topology, vertex_normals(mesh, topology)) for mesh in meshes.values()]
+    rows = [
+        [mirror_picture(mirror, camera, pixels, striped(wave, 2 * FREQUENCY)) for mirror in mirrors] for wave in STRIPES
+    ]
+    panels(rows, config.width, {name: [""] for name in meshes}).write(results.path(PICTURE), overwrite=results.force)
+
+
+def experiment(config: Config, results: Results) -> Report:
+    """Both designs, each in three ways."""
+    designs = {}
+    for design in (through_points(config), mirroring(config)):
+        report: Report = {"vertices": design.recipe.topology.num_vertices, "unknowns": design.hidden.numel()}
+        report["errors_of_gradients"] = gradients_compared(design, config)
+        print(f"{design.name}: errors of gradients at the start {report['errors_of_gradients']}", flush=True)
+        found = {}
+        for way in WAYS:
+            report[way], found[way] = found_by(design, way, config)
+            print(
+                f"{design.name}, {way}: " + ", ".join(f"{k} {v:.3g}" for k, v in report[way].items() if k != "history"),
+                flush=True,
+            )
+        designs[design.name] = report
+        start, _ = JobLayer(design.recipe)()
+        results.mesh(f"{design.name}_start.obj", start, design.recipe.topology)
+        results.mesh(f"{design.name}_found.obj", found[IMPLICIT], design.recipe.topology)
+        if design.name == "reflection":
+            draw_reflections(
+                {"start": start, "found": found[IMPLICIT], "wanted": wanted_mesh(design)}, design, config, results
+            )
+    draw_losses(designs, results)
+    return {"designs": designs}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The experiment from the command line."""
+    return run_experiment(NAME, __doc__, Config, experiment, [PICTURE, CHART, *MESHES], arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
