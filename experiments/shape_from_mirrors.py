@@ -47,9 +47,9 @@ class Config(ExperimentConfig):
     frequencies: tuple[float, ...] = setting(
         (0.5, 1.0, 2.0), "pairs of stripes over half the sphere, stage by stage", least=0.1
     )
-    steps: int = setting(60, "steps of Adam in every stage", least=1)
+    steps: int = setting(100, "steps of Adam in every stage", least=1)
     rate: float = setting(0.03, "learning rate at first, in mean edges; falls by a cosine", least=1e-6)
-    energy: float = setting(3e-3, "weight of E, over that of the mean squared error of pixels", least=0)
+    energy: float = setting(3e-4, "weight of E, over that of the mean squared error of pixels", least=0)
 
 
 def height(x: Tensor, y: Tensor) -> Tensor:
