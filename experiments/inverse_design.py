@@ -2,9 +2,9 @@
 
 Two designs with hidden handles are made, and found again from what they do: a surface of least C from points that it
 passes through, a mesh of least E from pictures of stripes that it mirrors. What is wanted is a function of the finished
-mesh, the mesh a function of its handles (`JobLayer`): a quasi-Newton method (L-BFGS) finds these with gradients through
-the solve. The same method, from the same start, with gradients by implicit differentiation, by unrolling ten
-Gauss-Newton steps, and (for a few steps only) by finite differences.
+mesh, the mesh a function of its handles (`JobLayer`): Adam finds these with gradients through the solve. The same, from
+the same start, with gradients by implicit differentiation, by unrolling ten Gauss-Newton steps, and (for a few steps
+only) by finite differences.
 """
 
 from __future__ import annotations
@@ -15,12 +15,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 from _charts import BLUE, GREEN, ORANGE, add_chart, add_legend
 from _common import ExperimentConfig, Report, Results, run_experiment, setting
 from _mirrors import Mirror, mirror_picture, panel_width, panels, striped
-from scipy.optimize import minimize
 from torch import Tensor
 
 from torchfair import Topology
@@ -54,8 +52,9 @@ class Config(ExperimentConfig):
     points: int = setting(8, "points that the surface of least C is to pass through", least=1)
     size: int = setting(64, "pixels along the pictures that are compared", least=16)
     pull: float = setting(0.8, "how far hidden handles are pulled, in mean edges", least=0.01)
-    steps: int = setting(12, "steps of the method", least=1)
-    difference_steps: int = setting(4, "steps of it with finite differences", least=1)
+    steps: int = setting(20, "steps of Adam", least=1)
+    rate: float = setting(0.15, "learning rate at first, in mean edges; falls by a cosine", least=1e-6)
+    difference_steps: int = setting(5, "steps of it with finite differences", least=1)
     difference: float = setting(1e-3, "finite differences, in mean edges", least=1e-12)
     tolerance: float = setting(1e-6, "of finished meshes, relative to their extent", least=1e-12)
 
@@ -165,16 +164,16 @@ class Search:
         self.best, self.history, self.seconds = math.inf, [], time.process_time()
         self.solves, self.faults, self.unit = 0, 0, design.recipe.unit.length
 
-    def __call__(self, places: np.ndarray) -> tuple[float, np.ndarray]:
-        at = torch.from_numpy(places).view(-1, 3)
+    def __call__(self, at: Tensor) -> Tensor | None:
+        """The gradient (h, 3) at handles (h, 3), noted with the loss; None where no mesh is finished."""
         try:
             loss, slope = self.by_differences(at) if self.way == DIFFERENCES else self.by_layer(at)
-        except DerivativeError:  # too far: the method turns back
+        except DerivativeError:
             self.faults += 1
-            return 1e3 * (1.0 + self.history[0]["loss"]), np.zeros_like(places)
+            return None
         self.best = min(self.best, loss)
         self.history.append({"loss": self.best, "seconds": time.process_time() - self.seconds, "solves": self.solves})
-        return loss, slope.numpy().ravel()
+        return slope
 
     def finished(self, at: Tensor, start: Tensor) -> Tensor:
         self.solves += 1
@@ -204,17 +203,25 @@ class Search:
 
 
 def found_by(design: Design, way: str, config: Config) -> tuple[Report, Tensor]:
-    """What the method finds with gradients of a kind."""
+    """What Adam finds with gradients of a kind; a step after which no mesh is finished is taken back by half."""
     search = Search(design, way, config)
-    start, unit = np.zeros(design.hidden.numel()), design.recipe.unit.length
-    begin = time.process_time()
-    search.seconds = begin
-    most = config.difference_steps if way == DIFFERENCES else config.steps
-    made = minimize(search, start, jac=True, method="L-BFGS-B", bounds=[(-2.5, 2.5)] * len(start),
-                    options={"maxiter": most, "maxfun": 2 * most, "gtol": 1e-9, "ftol": 1e-14})  # fmt: skip
-    seconds = time.process_time() - begin
-    targets = search.targets + unit * torch.from_numpy(made.x).view(-1, 3)
-    mesh, _ = JobLayer(design.recipe)({"targets": targets}, start=search.mesh)
+    at = torch.zeros_like(design.hidden, requires_grad=True)
+    adam, total = torch.optim.Adam([at], lr=config.rate, betas=(0.8, 0.99)), config.steps
+    fall = torch.optim.lr_scheduler.CosineAnnealingLR(adam, total)
+    begin = search.seconds = time.process_time()
+    for _ in range(config.difference_steps if way == DIFFERENCES else total):
+        before = at.detach().clone()
+        if at.grad is not None:
+            adam.step()
+            fall.step()
+        slope = search(at.detach())
+        while slope is None and search.faults < total:
+            at.data.lerp_(before, 0.5)
+            slope = search(at.detach())
+        if slope is not None:
+            at.grad = slope
+    seconds, unit = time.process_time() - begin, search.unit
+    targets, mesh = search.targets + unit * at.detach(), search.mesh
     return {
         "first_loss": search.history[0]["loss"],
         "loss": search.best,

@@ -268,6 +268,33 @@ def test_vertices_slide_until_reflections_are_smoother_without_folding(run: Run,
     assert (z - 0.5 * x**2 + 0.25 * y**2).abs().max() < 1e-9  # still on the surface
 
 
+@pytest.mark.slow
+def test_handles_are_found_through_the_solve(run: Run, tmp_path: Path) -> None:
+    report = run("inverse_design", "--vertices", "60", "--rows", "6", "--steps", "6", "--difference-steps", "1",
+                 "--size", "32", "--points", "4", "--handles", "1", "--pull", "0.4")["designs"]  # fmt: skip
+    for design in report.values():
+        assert design["errors_of_gradients"]["implicit"] < 0.01
+        assert design["errors_of_gradients"]["implicit"] < design["errors_of_gradients"]["unrolled"]
+        assert design["implicit"]["loss"] < 0.7 * design["implicit"]["first_loss"]
+        assert design["implicit"]["solves"] < design["finite differences"]["solves"] * 6
+    assert load_mesh(tmp_path / "out" / "points_found.obj").topology.is_triangular
+
+
+@pytest.mark.slow
+def test_a_surface_is_recovered_from_what_it_mirrors(run: Run, tmp_path: Path) -> None:
+    report = run("shape_from_mirrors", "--rows", "8", "--fine", "24", "--views", "3", "--size", "32", "--steps", "40",
+                 "--rate", "0.06")  # fmt: skip
+    surfaces = report["surfaces"]
+    for way in surfaces.values():
+        assert way["degrees"] < 0.4 * way["start"]["degrees"]
+        assert way["rms"] < 0.4 * way["start"]["rms"]
+    alone, energy = surfaces["pictures alone"], surfaces["pictures and E"]
+    assert energy["normal_variation"] < alone["normal_variation"]
+    found, wanted = (load_mesh(tmp_path / "out" / name) for name in ("pictures_and_e.obj", "surface.obj"))
+    boundary = found.topology.is_boundary_vertex
+    torch.testing.assert_close(found.vertices[boundary], wanted.vertices[boundary])
+
+
 @pytest.mark.parametrize(("name", "rows"), [("fig01_reflections", ["16"]), ("fig14_reflections", ["10", "16"])])
 def test_principal_meshes_have_least_energy_and_mirror_better(run: Run, name: str, rows: list[str]) -> None:
     report = run(name, "--size", "96", "--rows", *rows)

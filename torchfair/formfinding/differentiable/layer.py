@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 from torch import Tensor, nn
@@ -85,6 +85,14 @@ class JobLayer(nn.Module):
         self._recipe, self._problems = copied(recipe), CompiledProblems()
         trial = copied(recipe)
         trial.final(trial.state())
+
+    if TYPE_CHECKING:  # torch says Any
+
+        def __call__(
+            self, parameters: Mapping[str, Tensor] | None = None, *, start: Tensor | None = None
+        ) -> tuple[Tensor, JobLayerInfo | list[JobLayerInfo]]:
+            """What ``forward`` gives."""
+            ...
 
     def forward(
         self, parameters: Mapping[str, Tensor] | None = None, *, start: Tensor | None = None
