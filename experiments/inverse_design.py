@@ -25,7 +25,7 @@ from torchfair import Topology
 from torchfair.cameras import OrthographicCamera
 from torchfair.curves import ClosedCurve
 from torchfair.errors import DerivativeError
-from torchfair.formfinding import FairRecipe, FairSettings, FormRecipe, JobLayer, start_surface
+from torchfair.formfinding import FairRecipe, FairSettings, FormRecipe, FormSettings, JobLayer, start_surface
 from torchfair.geometry import ReferenceSurface, vertex_normals
 from torchfair.reflection import Stripes, cone_directions, render_reflection
 from torchfair.shapes import Paraboloid, parameter_quads
@@ -46,7 +46,9 @@ STRIPES = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], dtype=torch.float64)
 class Config(ExperimentConfig):
     """Settings of the experiment."""
 
+    designs: tuple[str, ...] = setting(("points", "reflection"), "what is looked for", choices=("points", "reflection"))
     vertices: int = setting(80, "vertices of the surface of least C, about", least=40)
+    smoothing: float = setting(0.3, "of C, as a fraction of the mean curvature of a star", least=1e-6)
     rows: int = setting(8, "cells along the mesh of least E", least=4)
     handles: int = setting(2, "handles of each design", least=1)
     points: int = setting(8, "points that the surface of least C is to pass through", least=1)
@@ -102,7 +104,9 @@ def through_points(config: Config) -> Design:
     """A ring between two wavy curves, of least C; points where the faces of the hidden design have their centres."""
     vertices, topology = start_surface([wavy_ring(2.0, 0.0), wavy_ring(0.7, 0.7)], config.vertices)
     chosen = spread(vertices, topology, config.handles)
-    recipe = FormRecipe(vertices, topology, handles=dict(zip(chosen.tolist(), vertices[chosen].tolist(), strict=True)))
+    handles = dict(zip(chosen.tolist(), vertices[chosen].tolist(), strict=True))
+    settings = FormSettings(smoothing=config.smoothing, coarse_smoothing=max(0.3, config.smoothing))
+    recipe = FormRecipe(vertices, topology, handles=handles, settings=settings)
     hidden = hidden_places(vertices, chosen, config.pull * recipe.unit.length)
     mesh, _ = JobLayer(recipe)({"targets": hidden})
     faces = torch.linspace(0, topology.num_faces - 1, config.points).long()
@@ -163,13 +167,15 @@ class Search:
         self.mesh, _ = self.layer({"targets": self.targets})
         self.best, self.history, self.seconds = math.inf, [], time.process_time()
         self.solves, self.faults, self.unit = 0, 0, design.recipe.unit.length
+        self.last_fault = ""
 
     def __call__(self, at: Tensor) -> Tensor | None:
         """The gradient (h, 3) at handles (h, 3), noted with the loss; None where no mesh is finished."""
         try:
             loss, slope = self.by_differences(at) if self.way == DIFFERENCES else self.by_layer(at)
-        except DerivativeError:
+        except DerivativeError as error:
             self.faults += 1
+            self.last_fault = str(error)
             return None
         self.best = min(self.best, loss)
         self.history.append({"loss": self.best, "seconds": time.process_time() - self.seconds, "solves": self.solves})
@@ -230,6 +236,7 @@ def found_by(design: Design, way: str, config: Config) -> tuple[Report, Tensor]:
         "seconds_per_gradient": seconds / len(search.history),
         "solves": search.solves,
         "faults": search.faults,
+        "last_fault": search.last_fault,
         "handles_off": float((targets - design.hidden).norm(dim=1).max()) / unit,
         "mesh_off": float((mesh - wanted_mesh(design)).norm(dim=1).max()) / unit,
         "history": search.history,
@@ -296,7 +303,7 @@ def draw_reflections(meshes: dict[str, Tensor], design: Design, config: Config, 
 def experiment(config: Config, results: Results) -> Report:
     """Both designs, each in three ways."""
     designs = {}
-    for design in (through_points(config), mirroring(config)):
+    for design in [{"points": through_points, "reflection": mirroring}[name](config) for name in config.designs]:
         report: Report = {"vertices": design.recipe.topology.num_vertices, "unknowns": design.hidden.numel()}
         report["errors_of_gradients"] = gradients_compared(design, config)
         print(f"{design.name}: errors of gradients at the start {report['errors_of_gradients']}", flush=True)
@@ -304,7 +311,8 @@ def experiment(config: Config, results: Results) -> Report:
         for way in WAYS:
             report[way], found[way] = found_by(design, way, config)
             print(
-                f"{design.name}, {way}: " + ", ".join(f"{k} {v:.3g}" for k, v in report[way].items() if k != "history"),
+                f"{design.name}, {way}: "
+                + ", ".join(f"{k} {v:.3g}" for k, v in report[way].items() if isinstance(v, float | int)),
                 flush=True,
             )
         designs[design.name] = report

@@ -91,7 +91,7 @@ def ring(radius: float, height: float) -> ClosedCurve:
 
 
 def form(**options: Any) -> Case:
-    vertices, topology = start_surface([ring(2.0, 0.0), ring(0.8, 0.8)], 80)
+    vertices, topology = start_surface([ring(2.0, 0.0), ring(0.8, 0.8)], 50)
     parameters = {"fairness_weight": number(0.5)}
     handles = {}
     if options.pop("pulled", False):
@@ -104,7 +104,7 @@ def form(**options: Any) -> Case:
 
 def symmetric() -> Case:
     """Stars between spheres, near a surface, with conditions met exactly."""
-    mesh = principal_triangles(Catenoid(), 6, 8, ends="zigzag")
+    mesh = principal_triangles(Catenoid(), 5, 8, ends="zigzag")
     principal = principal_edges_of_lattice(mesh, "u")
     targets = 1.04 * mesh.vertices[[18, 33]]
     handles = dict(zip([18, 33], targets.tolist(), strict=True))
