@@ -13,8 +13,10 @@ FLOORS = (
     {"errors", "_interrupts", "_loading", "_precision", "_short_repr", "_shown", "_solver_names", "_tables"}
     | {"_threads"},
     {"_names", "_numbers", "_ranges", "_staged", "_tracing", "cameras", "linear", "progress", "rasterisation"},
-    {"_atomic", "_half_edges", "settings"},
+    {"_atomic", "_half_edges", "_mesh_sums", "_packed_tensors", "settings"},
     {"_connectivity", "projection"},
+    {"_topology_tables"},
+    {"_joined_topology"},
     {"topology"},
     {"_graph"},
     {"_one_mesh", "boundary", "geometry", "polylines", "repair", "triangulation"},

@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
+from typing import Any, Literal, get_args
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from . import _connectivity
+from . import _connectivity, _joined_topology
 from ._loading import safe_to_load
-from ._names import PlacedError, few
-from ._tables import cached_table
+from ._packed_tensors import pack, unpack
+from ._tables import cached_table, outside_of_transforms
+from ._topology_tables import CHEAP_TABLES, JOINED_TABLES, MeshTables
 from .errors import MeshError, ShapeError
 
-_EAGER_TABLES = ("face_sizes", "is_triangular", "is_quadrangular", "faces_by_size", "next_corners", "valences",
-                 "is_boundary_vertex")  # fmt: skip
+Manifold = Literal["vertices", "edges"]
 
 
 @safe_to_load
 @dataclass(frozen=True, eq=False, repr=False)
-class Topology:
-    r"""Connectivity of an oriented manifold polygon mesh, with or without boundary.
+class Topology(MeshTables):
+    r"""Connectivity of an oriented manifold polygon mesh, with or without boundary; or of several, joined.
 
-    Build it with :meth:`from_faces`. It holds no positions: one topology serves any number of vertex
-    tensors ``(*batch, V, 3)``. All tensors are int64 (masks are bool) and live on :attr:`device`.
+    Build it with :meth:`from_faces`, or with :meth:`join` from others. It holds no positions: one topology serves any
+    number of vertex tensors ``(*batch, V, 3)``. All tensors are int64 (masks are bool) and live on :attr:`device`.
 
     Packed lists (faces, rings, loops) are a flat tensor with an offset tensor: item ``i`` is
-    ``flat[offsets[i]:offsets[i + 1]]``.
+    ``flat[offsets[i]:offsets[i + 1]]``. Rings, loops and all that is made of them are worked out when first asked for.
 
     Edges are numbered with interior edges first, then boundary edges, each group sorted by its two vertex
     numbers. Edge ``(v, w)`` has its left face on the side that is traversed ``v -> w`` counterclockwise::
@@ -38,6 +38,9 @@ class Topology:
               v ------ left face above, traversed v -> w
               |        right face below
               w
+
+    Topologies are equal if they have the same faces, corners and vertices in the same order (and are joined of the
+    same meshes), on whatever device. Copies and pickles hold one packed tensor.
 
     Attributes:
         num_vertices: V, isolated vertices included.
@@ -47,9 +50,7 @@ class Topology:
         corner_edges: (H,) edge from a corner to the next corner of its face.
         edges: (E, 2) vertices ``v, w`` of every edge.
         interior_edge_faces: (I, 2) left and right face of the interior edges.
-        ring_vertices, ring_offsets: (R,) and (V+1,) neighbours of each vertex, counterclockwise; around a boundary
-            vertex from the boundary edge with the surface on its left to the other one.
-        loop_vertices, loop_offsets: (B,) and (L+1,), boundary loops with the surface on the left.
+        mesh_offsets: (n+1,) first vertex of each of n joined meshes; None for one mesh.
     """
 
     num_vertices: int
@@ -59,44 +60,51 @@ class Topology:
     corner_edges: Tensor
     edges: Tensor
     interior_edge_faces: Tensor
-    ring_vertices: Tensor
-    ring_offsets: Tensor
-    loop_vertices: Tensor
-    loop_offsets: Tensor
+    mesh_offsets: Tensor | None = None
 
     def __post_init__(self) -> None:
-        # Tables that quantities read are filled now: one that is first read inside nested function transforms
-        # would keep a tensor that belongs to the transform.
+        # Tables that quantities read are filled now: torch.compile could not make those that depend on values.
         if self.device.type != "meta":
-            for name in _EAGER_TABLES:
+            for name in CHEAP_TABLES + (JOINED_TABLES if self.is_joined else ()):
                 getattr(self, name)
 
+    # ---- building --------------------------------------------------------------------------------------
+
     @classmethod
-    def from_faces(cls, faces: object, num_vertices: int | None = None) -> Topology:
+    def from_faces(cls, faces: object, num_vertices: int | None = None, *, manifold: Manifold = "vertices") -> Topology:
         """Topology of ``faces``.
 
         Args:
-            faces: ``(F, k)`` integer array or tensor, or a sequence of index sequences of any lengths.
+            faces: ``(F, k)`` integer array or tensor, or a sequence of index sequences of any lengths. Corners -1 at
+                the end of a row of an array are padding.
             num_vertices: V; by default one more than the largest index.
+            manifold: where the mesh is to be a manifold. With ``"edges"`` faces may touch in a vertex without sharing
+                an edge there: what needs edges only works (lengths, angles, normals, E and E', areas, umbrellas), and
+                what needs rings or boundary loops (stars, C, polylines) refuses with MeshError. It is also the
+                quickest way to build: rings are looked at when they are asked for.
 
         Raises:
             MeshError: naming the first few offending elements and the remedy, if a face has fewer than
                 three corners or a repeated one, an index is out of range, an edge has more than two faces
-                or is traversed twice in one direction, or the faces around a vertex form several fans.
-                :func:`torchfair.repair_mesh` mends what can be mended.
+                or is traversed twice in one direction, or (unless ``manifold="edges"``) the faces around a vertex form
+                several fans. :func:`torchfair.repair_mesh` mends what can be mended.
         """
-        return cls.from_packed_faces(*_connectivity.pack_faces(faces), num_vertices)
+        return cls.from_packed_faces(*_connectivity.pack_faces(faces), num_vertices, manifold=manifold)
 
     @classmethod
-    @torch.inference_mode(False)
     def from_packed_faces(
-        cls, corners: _connectivity.Ints, face_offsets: _connectivity.Ints, num_vertices: int | None = None
+        cls,
+        corners: _connectivity.Ints,
+        face_offsets: _connectivity.Ints,
+        num_vertices: int | None = None,
+        *,
+        manifold: Manifold = "vertices",
     ) -> Topology:
         """Like :meth:`from_faces`, from numpy arrays (copied) as in attributes ``corners`` and ``face_offsets``."""
+        if manifold not in get_args(Manifold):
+            raise MeshError(f'manifold must be "vertices" or "edges", got {manifold!r}')
         half = _connectivity.build_half_edges(corners.copy(), face_offsets.copy(), num_vertices)
         edges = _connectivity.build_edges(half)
-        ring, ring_offsets = _connectivity.build_rings(half, edges)
-        loops, loop_offsets = _connectivity.build_boundary_loops(half, edges)
         arrays = {
             "corners": half.corners,
             "face_offsets": half.offsets,
@@ -104,183 +112,124 @@ class Topology:
             "corner_edges": edges.corner_edges,
             "edges": edges.vertices,
             "interior_edge_faces": edges.faces,
-            "ring_vertices": ring,
-            "ring_offsets": ring_offsets,
-            "loop_vertices": loops,
-            "loop_offsets": loop_offsets,
         }
-        tensors = {name: torch.from_numpy(np.ascontiguousarray(a, np.int64)) for name, a in arrays.items()}
-        return cls(num_vertices=half.num_vertices, **tensors)
+        if manifold == "vertices":
+            _connectivity.check_fans(half, edges.twins)
+        with outside_of_transforms():
+            tensors = {name: torch.from_numpy(np.ascontiguousarray(a, np.int64)) for name, a in arrays.items()}
+            topology = cls(num_vertices=half.num_vertices, **tensors)
+            topology.__dict__.update(twins=torch.from_numpy(edges.twins))
+        return topology
 
-    def __getstate__(self) -> dict[str, object]:
-        """What copies and pickles hold: no tables that are made of it."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+    @classmethod
+    def join(cls, topologies: Iterable[Topology]) -> Topology:
+        """One topology of several meshes side by side, of which each is seen by itself.
 
-    def __setstate__(self, state: dict[str, object]) -> None:
-        self.__dict__.update(state)
-        self.__post_init__()
+        Vertices, faces, and edges of either kind follow each other mesh by mesh; vertices are ``torch.cat`` of those of
+        the meshes. Energies, penalties and scores have one value per mesh, ``(*batch, n)``: those of the meshes alone.
+        Topologies that are joined already are taken apart first; none at all make a topology of no meshes.
+        :class:`~torchfair.batches.MeshBatch` keeps vertices with it, and :attr:`meshes` takes it apart.
 
-    # ---- sizes -----------------------------------------------------------------------------------------
+        Raises:
+            MeshError: if there is anything else among them, or they are on several devices.
 
-    @property
-    def num_faces(self) -> int:
-        """F."""
-        return self.face_offsets.shape[0] - 1
-
-    @property
-    def num_edges(self) -> int:
-        """E, boundary edges included."""
-        return self.edges.shape[0]
-
-    @property
-    def num_interior_edges(self) -> int:
-        """I, edges with a face on either side; they carry the numbers 0..I-1."""
-        return self.interior_edge_faces.shape[0]
-
-    @property
-    def device(self) -> torch.device:
-        """Where the index tensors live."""
-        return self.edges.device
-
-    @cached_table
-    def face_sizes(self) -> Tensor:
-        """(F,) number of corners."""
-        return self.face_offsets.diff()
+        Example:
+            >>> from torchfair import NormalVariation
+            >>> from torchfair.shapes import icosphere
+            >>> meshes = [icosphere(1), icosphere(2)]
+            >>> energy = NormalVariation(Topology.join(m.topology for m in meshes))
+            >>> energy(torch.cat([m.vertices for m in meshes])).shape
+            torch.Size([2])
+        """
+        parts = _joined_topology.checked_parts(topologies, cls)
+        with outside_of_transforms():
+            return cls(sum(part.num_vertices for part in parts), **_joined_topology.joined_tensors(parts))
 
     @cached_table
-    def is_triangular(self) -> bool:
-        """Whether every face is a triangle."""
-        return bool((self.face_sizes == 3).all())
+    def meshes(self) -> tuple[Topology, ...]:
+        """The topologies of the meshes that this one is joined of, in order; itself if it is one mesh."""
+        if not self.is_joined:
+            return (self,)
+        return tuple(Topology(count, **tensors) for count, tensors in _joined_topology.split_tensors(self))
 
-    @cached_table
-    def is_quadrangular(self) -> bool:
-        """Whether every face has four corners."""
-        return bool((self.face_sizes == 4).all())
+    # ---- comparing, copying and moving -----------------------------------------------------------------
 
     def __repr__(self) -> str:
         kind = "triangle" if self.is_triangular else "quad" if self.is_quadrangular else "polygon"
+        mesh = f"{self.num_meshes} {kind} meshes" if self.is_joined else f"{kind} mesh"
         return (
-            f"Topology({kind} mesh: {self.num_vertices} vertices, {self.num_edges} edges "
+            f"Topology({mesh}: {self.num_vertices} vertices, {self.num_edges} edges "
             f"({self.num_edges - self.num_interior_edges} on the boundary), {self.num_faces} faces)"
         )
 
     @cached_table
     def fingerprint(self) -> str:
-        """Checksum of the faces and of V, equal where faces and corners are equal in equal order."""
+        """Checksum of the faces, of V and of what is joined, equal for equal topologies."""
         digest = hashlib.sha256(str(self.num_vertices).encode())
-        for tensor in (self.corners, self.face_offsets):
-            digest.update(tensor.cpu().numpy().tobytes())
+        for tensor in (self.corners, self.face_offsets, self.mesh_offsets):
+            if tensor is not None:
+                digest.update(tensor.cpu().numpy().tobytes())
         return digest.hexdigest()
 
-    # ---- edges -----------------------------------------------------------------------------------------
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Topology):
+            return NotImplemented
+        if self is other:
+            return True
+        if self.num_vertices != other.num_vertices or self.is_joined != other.is_joined:
+            return False
+        pairs = [(self.corners, other.corners), (self.face_offsets, other.face_offsets)]
+        if self.mesh_offsets is not None and other.mesh_offsets is not None:
+            pairs.append((self.mesh_offsets, other.mesh_offsets))
+        return all(torch.equal(ours, theirs.to(ours.device)) for ours, theirs in pairs)
 
-    @property
-    def interior_edges(self) -> Tensor:
-        """(I, 2) vertices ``v, w``."""
-        return self.edges[: self.num_interior_edges]
+    def __hash__(self) -> int:
+        return hash(self.fingerprint)
 
-    @property
-    def boundary_edges(self) -> Tensor:
-        """(E-I, 2) vertices ``v, w``, the surface on the left."""
-        return self.edges[self.num_interior_edges :]
+    def __getstate__(self) -> dict[str, object]:
+        """What copies and pickles hold: one tensor, so that processes share one file; no tables that are made of it."""
+        tensors = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "num_vertices"}
+        return {"num_vertices": self.num_vertices, **pack({n: t for n, t in tensors.items() if t is not None})}
 
-    @cached_table
-    def triangles(self) -> Tensor:
-        """(F, 3) faces of a triangle mesh.
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(mesh_offsets=None, num_vertices=state.pop("num_vertices"))
+        with outside_of_transforms():
+            self.__dict__.update(unpack(state))
+            self.__post_init__()
 
-        Raises:
-            MeshError: if a face is not a triangle.
-        """
-        self.require_triangles()
-        return self.corners.view(-1, 3)
-
-    @cached_table
-    def edge_flaps(self) -> Tensor:
-        """(I, 4) vertices ``v, w, a, b`` of each interior edge of a triangle mesh.
-
-        ``v, w`` are the edge, ``a`` is opposite in the left face and ``b`` opposite in the right face.
-
-        Raises:
-            MeshError: if a face is not a triangle.
-        """
-        triangles = self.triangles
-        v, w = self.interior_edges.unbind(1)
-        opposite = triangles[self.interior_edge_faces].sum(-1) - (v + w)[:, None]
-        return torch.stack([v, w, opposite[:, 0], opposite[:, 1]], dim=1)
-
-    # ---- faces -----------------------------------------------------------------------------------------
-
-    @cached_table
-    def next_corners(self) -> Tensor:
-        """(H,) the next corner of the same face, counterclockwise."""
-        following = torch.arange(1, self.corners.shape[0] + 1, device=self.device)
-        following[self.face_offsets[1:] - 1] = self.face_offsets[:-1]
-        return following
-
-    @cached_table
-    def faces_by_size(self) -> dict[int, tuple[Tensor, Tensor]]:
-        """Faces grouped by number of corners, ``{k: (face numbers (n,), corners (n, k))}``."""
-        groups: dict[int, tuple[Tensor, Tensor]] = {}
-        for size in torch.unique(self.face_sizes).tolist():
-            numbers = torch.nonzero(self.face_sizes == size).squeeze(1)
-            columns = torch.arange(size, device=self.device)
-            groups[size] = (numbers, self.corners[self.face_offsets[numbers, None] + columns])
-        return groups
-
-    def face_lists(self) -> list[list[int]]:
-        """Faces as lists of vertex numbers, in order."""
-        flat, offsets = self.corners.tolist(), self.face_offsets.tolist()
-        return [flat[a:b] for a, b in itertools.pairwise(offsets)]
-
-    # ---- vertices --------------------------------------------------------------------------------------
-
-    @cached_table
-    def valences(self) -> Tensor:
-        """(V,) number of edges at each vertex; 0 for isolated vertices."""
-        return self.ring_offsets.diff()
-
-    @cached_table
-    def is_boundary_vertex(self) -> Tensor:
-        """(V,) bool."""
-        mask = torch.zeros(self.num_vertices, dtype=torch.bool, device=self.device)
-        mask[self.loop_vertices] = True
-        return mask
-
-    @cached_table
-    def rings_by_valence(self) -> dict[int, tuple[Tensor, Tensor]]:
-        """Interior vertices grouped by valence, ``{k: (vertices (n,), ring (n, k))}``, rings counterclockwise."""
-        interior = ~self.is_boundary_vertex & (self.valences > 0)
-        groups: dict[int, tuple[Tensor, Tensor]] = {}
-        for valence in torch.unique(self.valences[interior]).tolist():
-            vertices = torch.nonzero(interior & (self.valences == valence)).squeeze(1)
-            columns = torch.arange(valence, device=self.device)
-            groups[valence] = (vertices, self.ring_vertices[self.ring_offsets[vertices, None] + columns])
-        return groups
-
-    def boundary_loops(self) -> list[Tensor]:
-        """Boundary loops as vertex tensors, the surface on the left, each starting at its smallest vertex."""
-        return list(torch.split(self.loop_vertices, self.loop_offsets.diff().tolist()))
-
-    # ---- moving and checking ---------------------------------------------------------------------------
-
-    @torch.inference_mode(False)
     def map_tensors(self, function: Callable[[Tensor], Tensor]) -> Topology:
         """A copy with ``function`` applied to every index tensor (used to move devices)."""
-        changed = {f.name: function(getattr(self, f.name)) for f in fields(self) if f.name != "num_vertices"}
-        return Topology(self.num_vertices, **changed)
+        with outside_of_transforms():
+            tensors = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "num_vertices"}
+            changed: dict[str, Any] = {
+                name: None if tensor is None else function(tensor) for name, tensor in tensors.items()
+            }
+            return Topology(self.num_vertices, **changed)
 
     def to(self, device: torch.device | str) -> Topology:
         """The same topology with its tensors on ``device``."""
         return self.map_tensors(lambda tensor: tensor.to(device))
 
-    def require_triangles(self) -> None:
-        """Raises MeshError naming the first faces that are not triangles."""
-        if not self.is_triangular:
-            others = torch.nonzero(self.face_sizes != 3).squeeze(1).tolist()
-            raise PlacedError(
-                f"a triangle mesh is needed, but {len(others)} face(s) are not triangles: faces ",
-                few("face", others),
-                ". Triangulate them first.",
+    def cpu(self) -> Topology:
+        """The same topology in the memory of the CPU."""
+        return self.to("cpu")
+
+    def cuda(self, device: torch.device | str | int | None = None) -> Topology:
+        """The same topology on a GPU, the current one by default."""
+        return self.map_tensors(lambda tensor: tensor.cuda(device))
+
+    def pin_memory(self) -> Topology:
+        """The same topology in page-locked memory, from where it goes to a GPU faster; ``DataLoader`` calls this."""
+        return self.map_tensors(Tensor.pin_memory)
+
+    # ---- checking --------------------------------------------------------------------------------------
+
+    def require_one_mesh(self, what: str) -> None:
+        """Raises MeshError if several meshes are joined; ``what`` cannot take them."""
+        if self.is_joined:
+            raise MeshError(
+                f"{what} takes one mesh, but {self.num_meshes} are joined. Call it for each: "
+                "Topology.meshes and MeshBatch take them apart."
             )
 
     def check_vertices(self, vertices: Tensor) -> None:

@@ -12,6 +12,7 @@ from .._shown import shown
 from ..errors import ShapeError
 from ..projection import ElementTerm
 from ..projection.layout import Layout
+from ..topology import Topology
 from ._part import Part
 
 _MANY = 2**31 - 1  # rows of a block of which nothing is known
@@ -87,6 +88,25 @@ class Constraint(nn.Module):
         vertices = self._read(vertices)
         nothing = vertices[..., :0, 0]
         return torch.cat([nothing, *(part.evaluate(vertices)[1] for part in self._parts())], dim=-1)
+
+    def per_mesh(self, vertices: Tensor, topology: Topology) -> Tensor:
+        """What the elements of each of n joined meshes contribute, (*batch, n); sums to ``forward(vertices)``.
+
+        An element belongs to the mesh of its first vertex. Where nothing is joined it is ``forward(vertices)``.
+
+        Args:
+            vertices: (*batch, V, 3).
+            topology: of the vertices, from :meth:`Topology.join`.
+
+        Raises:
+            ShapeError: ``vertices`` is not a floating tensor (*batch, V, 3).
+        """
+        topology.check_vertices(vertices)
+        if not topology.is_joined:
+            return self.forward(vertices)
+        first = [part.indices[0][:, 0] for part in self._parts()]
+        nothing = topology.corners[:0]
+        return topology.sum_per_mesh(self.per_element(vertices), topology.sums_over(torch.cat([nothing, *first])))
 
     def residuals(self, vertices: Tensor) -> list[Tensor]:
         """Residuals (*batch, n, m) of the n elements of each term, without weights; zero where they are no numbers.

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from .._mesh_sums import MeshSums
+from .._tables import cached_table
 from ..topology import Topology
-from ._normal_variation_memory import Scratch
+from ._normal_variation_memory import Scratch, shared_scratch
 
 FACES_PER_THREAD = 65536
 """Faces that each thread of a CPU handles at once: few enough for its cache, enough to be worth waking it."""
@@ -32,7 +34,9 @@ class Block:
         corners: vertex at each corner.
         corners_short: the same with 32 bits.
         neighbours: place of the face behind each side, the face itself on the boundary.
-        edges: edge at each side; 0 on the boundary, where no term is left to weigh.
+        sides: (n, k) corner where each side starts.
+        topology: what the faces are from.
+        sums: for the faces of each of several meshes; None if there is one mesh.
     """
 
     corner_count: int
@@ -41,7 +45,9 @@ class Block:
     corners: Tensor
     corners_short: Tensor
     neighbours: Tensor
-    edges: Tensor
+    sides: Tensor
+    topology: Topology
+    sums: MeshSums | None
 
     @property
     def face_count(self) -> int:
@@ -52,6 +58,12 @@ class Block:
     def side_count(self) -> int:
         """Number k * n of sides."""
         return self.corners.shape[0]
+
+    @cached_table
+    def edges(self) -> Tensor:
+        """Edge at each side; 0 on the boundary, where no term is left to weigh."""
+        edges = self.topology.corner_edges[self.sides]
+        return _columns(torch.where(edges < self.topology.num_interior_edges, edges, 0)).int()
 
     def take(self, values: Tensor) -> Tensor:
         """The block's part of face values (..., F) in the order of places."""
@@ -72,6 +84,8 @@ class Tables:
         face_count: F.
         most_faces: faces of the largest block.
         most_sides: sides of the block with most.
+        vertex_meshes: (V,) mesh of each vertex, if meshes are joined.
+        num_meshes: n.
         scratch: memory to work in.
     """
 
@@ -79,7 +93,14 @@ class Tables:
     face_count: int
     most_faces: int
     most_sides: int
+    vertex_meshes: Tensor | None
+    num_meshes: int
     scratch: Scratch
+
+    @property
+    def mesh_shape(self) -> tuple[int, ...]:
+        """(n,) for n joined meshes, () for one mesh."""
+        return () if self.vertex_meshes is None else (self.num_meshes,)
 
 
 @torch.inference_mode(False)
@@ -93,7 +114,9 @@ def tables_of(topology: Topology) -> Tables:
             face_count=topology.num_faces,
             most_faces=max((block.face_count for block in blocks), default=0),
             most_sides=max((block.side_count for block in blocks), default=0),
-            scratch=Scratch(),
+            vertex_meshes=topology.vertex_meshes if topology.is_joined else None,
+            num_meshes=topology.num_meshes,
+            scratch=shared_scratch(topology.corners.shape[0]) or Scratch(),
         )
         # The same place where functools.cached_property keeps its values.
         topology.__dict__[_CACHE] = tables
@@ -102,40 +125,57 @@ def tables_of(topology: Topology) -> Tables:
 
 def _build(topology: Topology) -> tuple[Block, ...]:
     limit = faces_per_block(topology.corners.is_cpu)
-    places, neighbours = _neighbours(topology)
-    edges = torch.where(topology.corner_edges < topology.num_interior_edges, topology.corner_edges, 0)
+    neighbours = _neighbours(topology)
     blocks = []
+    begin = 0
     for size, (faces, corners) in topology.faces_by_size.items():
-        first_place = int(places[faces[0]])
-        sides = topology.face_offsets[faces, None] + torch.arange(size, device=topology.device)
+        sides = _sides(topology, faces, size)
         for start in range(0, faces.shape[0], limit):
             part = slice(start, start + limit)
             vertices = _columns(corners[part])
             block = Block(
                 corner_count=size,
-                start=first_place + start,
-                stop=first_place + min(start + limit, faces.shape[0]),
+                start=begin + start,
+                stop=begin + min(start + limit, faces.shape[0]),
                 corners=vertices,
                 corners_short=vertices.int(),
-                neighbours=_columns(neighbours[sides[part]]).int(),
-                edges=_columns(edges[sides[part]]).int(),
+                neighbours=_columns(_take(neighbours, sides[part])),
+                sides=sides[part],
+                topology=topology,
+                sums=_sums(topology, faces[part]),
             )
             blocks.append(block)
+        begin += faces.shape[0]
     return tuple(blocks)
 
 
-def _neighbours(topology: Topology) -> tuple[Tensor, Tensor]:
-    """Place of every face (F,), and place of the face behind each side (H,)."""
-    places = torch.empty(topology.num_faces, dtype=torch.int64, device=topology.device)
+def _neighbours(topology: Topology) -> Tensor:
+    """Place of the face behind each side, (H,) with 32 bits."""
+    twins = topology.twins
+    own = torch.arange(twins.shape[0], device=topology.device)
+    faces = topology.corner_faces.int().index_select(0, torch.where(twins < 0, own, twins))
     order = [faces for faces, _ in topology.faces_by_size.values()]
-    if order:
-        places[torch.cat(order)] = torch.arange(topology.num_faces, device=topology.device)
-    own = topology.corner_faces
-    interior = topology.corner_edges < topology.num_interior_edges
-    behind = own.clone()
-    # Of the two faces beside an edge, the other one.
-    behind[interior] = topology.interior_edge_faces.sum(1)[topology.corner_edges[interior]] - own[interior]
-    return places, places[behind]
+    if len(order) < 2:
+        return faces
+    places = torch.empty(topology.num_faces, dtype=torch.int32, device=topology.device)
+    places[torch.cat(order)] = torch.arange(topology.num_faces, dtype=torch.int32, device=topology.device)
+    return places[faces]
+
+
+def _sides(topology: Topology, faces: Tensor, size: int) -> Tensor:
+    """(n, size) corners of ``faces``, which are all that have so many."""
+    if faces.shape[0] == topology.num_faces:
+        return torch.arange(topology.corners.shape[0], device=topology.device).view(-1, size)
+    return topology.face_offsets[faces, None] + torch.arange(size, device=topology.device)
+
+
+def _take(values: Tensor, sides: Tensor) -> Tensor:
+    """``values[sides]``; where these are all in order, as in meshes of one kind of faces, without copying."""
+    return values.view(sides.shape) if sides.numel() == values.numel() else values[sides]
+
+
+def _sums(topology: Topology, faces: Tensor) -> MeshSums | None:
+    return MeshSums.of(topology.face_meshes[faces], topology.num_meshes) if topology.is_joined else None
 
 
 def _columns(table: Tensor) -> Tensor:

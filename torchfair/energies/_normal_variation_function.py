@@ -12,7 +12,7 @@ from torch.autograd import Function
 from .._precision import in_single_at_least
 from .._tracing import is_recorded, is_transformed
 from ..geometry import dual_edge_lengths, edge_lengths
-from ..geometry._unit import in_its_unit
+from ..geometry._unit import in_their_units
 from ..topology import Topology
 from ._normal_variation_blocks import faces_per_block, tables_of
 from ._normal_variation_kernel import energy_and_gradient
@@ -22,7 +22,7 @@ from ._normal_variation_kernel import energy_and_gradient
 def plain_terms(vertices: Tensor, topology: Topology) -> Tensor:
     """``l l*`` (*batch, I) of every interior edge, by differentiable functions of the geometry."""
     topology.check_vertices(vertices)
-    vertices, unit = in_its_unit(vertices)
+    vertices, unit = in_their_units(vertices, topology, "interior_edges")
     lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
     return lengths * dual_edge_lengths(vertices, topology) * unit
 
@@ -38,7 +38,10 @@ def fast_path_serves() -> bool:
 
 
 def fast_normal_variation(vertices: Tensor, edge_weights: Tensor | None, topology: Topology) -> Tensor:
-    """E (*batch,) of ``vertices`` (*batch, V, 3); ``edge_weights`` (*batch, I) or fewer dimensions, same dtype."""
+    """E (*batch,) of ``vertices`` (*batch, V, 3); ``edge_weights`` (*batch, I) or fewer dimensions, same dtype.
+
+    Of n joined meshes (*batch, n), here and in what follows.
+    """
     if edge_weights is not None:
         batch = torch.broadcast_shapes(vertices.shape[:-2], edge_weights.shape[:-1])  # type: ignore[no-untyped-call]
         vertices = vertices.expand(*batch, -1, -1)
@@ -75,18 +78,19 @@ class _Energy(Function):
             along_vertices = _scaled_gradient(factor, vertices, edge_weights, gradient, ctx.topology)
         if factor is not None and ctx.needs_input_grad[1]:
             # Autograd itself sums over dimensions along which the weights were repeated.
-            along_weights = factor[..., None] * plain_terms(vertices, ctx.topology)
+            along_weights = ctx.topology.spread(factor, "interior_edges") * plain_terms(vertices, ctx.topology)
         return along_vertices, along_weights, None, None
 
     @staticmethod
     def jvp(ctx: Any, *tangents: Any) -> tuple[Tensor, None]:
         vertices, edge_weights, gradient = ctx.saved_tensors
-        rate = vertices.new_zeros(vertices.shape[:-2])
+        topology = ctx.topology
+        rate = vertices.new_zeros((*vertices.shape[:-2], *tables_of(topology).mesh_shape))
         if tangents[0] is not None:
-            slope = _scaled_gradient(torch.ones_like(rate), vertices, edge_weights, gradient, ctx.topology)
-            rate = rate + (slope * tangents[0]).sum((-2, -1))
+            slope = _scaled_gradient(torch.ones_like(rate), vertices, edge_weights, gradient, topology)
+            rate = rate + topology.sum_per_mesh((slope * tangents[0]).sum(-1), "vertices")
         if tangents[1] is not None:
-            rate = rate + (plain_terms(vertices, ctx.topology) * tangents[1]).sum(-1)
+            rate = rate + topology.sum_per_mesh(plain_terms(vertices, topology) * tangents[1], "interior_edges")
         return rate, None
 
 
@@ -105,7 +109,7 @@ class _Gradient(Function):
         ctx.save_for_backward(factor, vertices, edge_weights, gradient)
         ctx.save_for_forward(factor, vertices, edge_weights, gradient)
         ctx.topology = topology
-        return factor[..., None, None] * gradient
+        return topology.spread(factor, "vertices")[..., None] * gradient
 
     @staticmethod
     def backward(ctx: Any, *cotangents: Tensor) -> tuple[Tensor | None, ...]:
@@ -149,7 +153,7 @@ def _plain_gradient(topology: Topology) -> Callable[..., Tensor]:
             return (terms if edge_weights is None else terms * edge_weights).sum()
 
         slope: Tensor = torch.func.grad(energy)(vertices)
-        return factor[..., None, None] * slope
+        return topology.spread(factor, "vertices")[..., None] * slope
 
     return gradient
 
@@ -158,9 +162,9 @@ def _evaluate(
     vertices: Tensor, edge_weights: Tensor | None, topology: Topology, with_gradient: bool
 ) -> tuple[Tensor, Tensor]:
     """E (*batch,) and its gradient (*batch, V, 3), or an empty tensor in its place."""
-    batch, count = vertices.shape[:-2], topology.num_vertices
+    batch, count, meshes = vertices.shape[:-2], topology.num_vertices, tables_of(topology).mesh_shape
     flat = vertices.reshape(batch.numel(), count, 3)
-    energy = flat.new_empty(flat.shape[0])
+    energy = flat.new_empty(flat.shape[0], *meshes)
     gradient = flat.new_empty(flat.shape) if with_gradient else None
     if edge_weights is not None:
         rows = batch if edge_weights.dim() > 1 else torch.Size()
@@ -172,4 +176,4 @@ def _evaluate(
         weights = edge_weights if edge_weights is None or edge_weights.shape[0] == 1 else edge_weights[part]
         slope = None if gradient is None else gradient[part]
         energy[part] = energy_and_gradient(flat[part], weights, tables_of(topology), slope)
-    return energy.view(batch), flat.new_empty(0) if gradient is None else gradient.view(vertices.shape)
+    return energy.view((*batch, *meshes)), flat.new_empty(0) if gradient is None else gradient.view(vertices.shape)

@@ -36,11 +36,11 @@ def energy_and_gradient(
 ) -> Tensor:
     """Energies (B,) of ``vertices`` (B, V, 3); writes their gradients to ``gradient`` (B, V, 3) unless it is None.
 
-    ``edge_weights`` is None, (1, I) or (B, I).
+    Of n joined meshes (B, n). ``edge_weights`` is None, (1, I) or (B, I).
     """
     with tables.scratch.lend(vertices, _memory_needed(vertices, tables)) as memory:
         positions = memory.take(3, *vertices.shape[:2]).copy_(vertices.movedim(-1, 0))
-        unit = bring_to_unit(positions)
+        unit = bring_to_unit(positions, tables.vertex_meshes, tables.num_meshes)
         side_buffer = memory.take(5, vertices.shape[0], tables.most_sides)
         face_buffer = memory.take(4, vertices.shape[0], tables.most_faces)
         normals = memory.take(3, vertices.shape[0], tables.face_count)
@@ -51,14 +51,15 @@ def energy_and_gradient(
             sides, squared = _side_vectors(positions, block, scratch, memory)
             _write_normals(sides, squared, block.take(normals), block.take(inverse_norms), scratch)
             all_sides.append((sides, squared))
-        energy = vertices.new_zeros(vertices.shape[0])
+        energy = vertices.new_zeros(vertices.shape[0], *tables.mesh_shape)
         forces = positions.zero_()  # the positions have been used up
         for block, (sides, squared) in zip(tables.blocks, all_sides, strict=True):
             own = block.take(normals)
             buffer = side_buffer[..., : block.side_count].view(5, *squared.shape)
             jumps, stretch, turn = buffer[:3], buffer[3], buffer[4]
             _gather(normals, block.neighbours, out=jumps).sub_(own.unsqueeze(2))
-            energy += _terms(squared, jumps, _weights_of(block, edge_weights), stretch, turn)
+            terms = _terms(squared, jumps, _weights_of(block, edge_weights), stretch, turn)
+            energy += terms.sum((1, 2)) if block.sums is None else block.sums.sum(terms.sum(1))
             if gradient is not None:
                 scratch = face_buffer[..., : block.face_count]
                 pull = _pull(jumps, turn, own, block.take(inverse_norms), scratch)
@@ -110,7 +111,7 @@ def _write_normals(
 
 
 def _terms(squared: Tensor, jumps: Tensor, weights: Tensor | None, stretch: Tensor, turn: Tensor) -> Tensor:
-    """Sum (B,) of ``|e| |d|``, given ``|e|^2`` (overwritten) and d.
+    """``|e| |d|`` (B, k, n), given ``|e|^2`` (overwritten) and d.
 
     Writes ``|d|/|e|`` to ``stretch`` and ``|e|/|d|`` to ``turn`` (B, k, n). Both are 0 where ``|e| |d|`` is 0
     or infinite: flat edges, boundary, zero length, degenerate faces.
@@ -123,7 +124,7 @@ def _terms(squared: Tensor, jumps: Tensor, weights: Tensor | None, stretch: Tens
     # |d| is at most 2, unless it is to be removed: then a finite number times 0.
     stretch.clamp_(max=5).mul_(turn)
     turn.mul_(squared)
-    return squared.mul_(stretch).sum((1, 2))
+    return squared.mul_(stretch)
 
 
 def _pull(jumps: Tensor, turn: Tensor, normals: Tensor, inverse_norms: Tensor, scratch: Tensor) -> Tensor:

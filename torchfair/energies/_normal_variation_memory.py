@@ -39,6 +39,19 @@ class Scratch:
             self._kept[:] = [kept]
 
 
+_SHARED = Scratch()
+_SHARED_CORNERS = 1_000_000
+
+
+def shared_scratch(num_corners: int) -> Scratch | None:
+    """The memory that all meshes of less than a million corners share, None for larger ones.
+
+    A mesh that is evaluated once only, as when its faces change at every step, would spend most of its time on memory
+    of its own. What is kept is that of the largest of them, at most some 60 MB in float64 for a single mesh.
+    """
+    return _SHARED if num_corners < _SHARED_CORNERS else None
+
+
 class Memory:
     """A flat tensor to be handed out piece by piece."""
 

@@ -7,7 +7,7 @@ from torch import Tensor
 from .._loading import safe_to_load
 from .._precision import in_single_at_least
 from ..geometry import dihedral_angles, edge_lengths
-from ..geometry._unit import in_its_unit
+from ..geometry._unit import in_their_units
 from ..topology import Topology
 from .base import EdgeEnergy, weigh
 
@@ -16,7 +16,7 @@ from .base import EdgeEnergy, weigh
 def lengths_times_angles(vertices: Tensor, topology: Topology) -> Tensor:
     """Length times signed dihedral angle (*batch, I) of every interior edge, for meshes of any size."""
     topology.check_vertices(vertices)
-    vertices, unit = in_its_unit(vertices)
+    vertices, unit = in_their_units(vertices, topology, "interior_edges")
     lengths = edge_lengths(vertices, topology)[..., : topology.num_interior_edges]
     return lengths * dihedral_angles(vertices, topology) * unit
 
@@ -65,7 +65,7 @@ def angle_variation(vertices: Tensor, topology: Topology, edge_weights: Tensor |
         >>> angle_variation(mesh.vertices, mesh.topology)
         tensor(23.4003, dtype=torch.float64)
     """
-    return angle_variation_per_edge(vertices, topology, edge_weights).sum(-1)
+    return topology.sum_per_mesh(angle_variation_per_edge(vertices, topology, edge_weights), "interior_edges")
 
 
 @safe_to_load

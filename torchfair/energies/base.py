@@ -45,8 +45,9 @@ class MeshModule(nn.Module, metaclass=_MadeForTraining):
     of torchfair with ``weights_only=True``.
 
     Args:
-        topology: connectivity of all meshes that the module is called with.
-        reduction: what ``forward`` makes of the values (*batch,) of the meshes: ``"none"`` leaves them, ``"mean"`` and
+        topology: connectivity of all meshes that the module is called with. If it is joined of n meshes
+            (:meth:`Topology.join`), there is a value of each: ``(*batch, n)`` wherever ``(*batch,)`` is said.
+        reduction: what ``forward`` makes of the values of the meshes: ``"none"`` leaves them, ``"mean"`` and
             ``"sum"`` give one number.
 
     Raises:
@@ -76,11 +77,11 @@ class MeshModule(nn.Module, metaclass=_MadeForTraining):
         self._set_topology(topology)
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
-        """Values (*batch,) of the meshes ``vertices`` (*batch, V, 3)."""
+        """Values (*batch,) of the meshes ``vertices`` (*batch, V, 3); (*batch, n) of n joined ones."""
         raise NotImplementedError(f"{type(self).__name__} defines neither per_mesh nor forward")
 
     def forward(self, vertices: Tensor) -> Tensor:
-        """Values (*batch,) of ``vertices`` (*batch, V, 3), or their mean or sum."""
+        """Values (*batch,) of ``vertices`` (*batch, V, 3), (*batch, n) of n joined meshes, or their mean or sum."""
         values = self.per_mesh(vertices)
         if self.reduction == "none":
             return values
@@ -171,7 +172,7 @@ class EdgeEnergy(MeshModule):
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
         """Energies (*batch,) of ``vertices`` (*batch, V, 3)."""
-        return self.per_edge(vertices).sum(-1)
+        return self.topology.sum_per_mesh(self.per_edge(vertices), "interior_edges")
 
 
 def register(module: nn.Module, name: str, tensor: Tensor | None) -> None:

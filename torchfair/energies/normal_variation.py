@@ -76,7 +76,7 @@ def normal_variation(vertices: Tensor, topology: Topology, edge_weights: Tensor 
     """
     topology.check_vertices(vertices)
     if not fast_path_serves():
-        return normal_variation_per_edge(vertices, topology, edge_weights).sum(-1)
+        return topology.sum_per_mesh(normal_variation_per_edge(vertices, topology, edge_weights), "interior_edges")
     check_edge_weights(edge_weights, topology)
     if edge_weights is not None:
         edge_weights = edge_weights.to(vertices.dtype)

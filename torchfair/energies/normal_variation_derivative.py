@@ -68,7 +68,7 @@ def normal_variation_derivative(
         raise ShapeError("velocity", f"a floating tensor (*batch, {topology.num_vertices}, 3)", actual)
     motion = torch.cat(torch.broadcast_tensors(vertices, velocity.to(vertices.dtype)), dim=-1)  # type: ignore[no-untyped-call]
 
-    return weigh(_rates(motion, topology), edge_weights, topology).sum(-1)
+    return topology.sum_per_mesh(weigh(_rates(motion, topology), edge_weights, topology), "interior_edges")
 
 
 def _rates(motion: Tensor, topology: Topology) -> Tensor:

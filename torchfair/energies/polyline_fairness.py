@@ -59,7 +59,10 @@ def polyline_fairness(vertices: Tensor, topology: Topology, triples: Tensor | No
         >>> polyline_fairness(mesh.vertices, mesh.topology)
         tensor(5.6819, dtype=torch.float64)
     """
-    return polyline_fairness_per_triple(vertices, topology, triples).sum(-1)
+    if triples is None:
+        triples = straight_triples(topology)
+    terms = polyline_fairness_per_triple(vertices, topology, triples)
+    return topology.sum_per_mesh(terms, topology.sums_over(triples[:, 1])) if topology.is_joined else terms.sum(-1)
 
 
 @safe_to_load
@@ -102,10 +105,13 @@ class PolylineFairness(MeshModule):
                 f"the first is triple {int(outside[0])}: {triples[outside[0]].tolist()}. Count vertices from zero."
             )
         self.triples = triples.to(topology.device)
+        self._sums = topology.sums_over(self.triples[:, 1])
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> MeshModule:
         super()._apply(fn, recurse)
-        self.triples = self.triples.to(self.topology.device)
+        if self.triples.device != self.topology.device:
+            self.triples = self.triples.to(self.topology.device)
+            self._sums = self.topology.sums_over(self.triples[:, 1])
         return self
 
     def per_triple(self, vertices: Tensor) -> Tensor:
@@ -114,4 +120,4 @@ class PolylineFairness(MeshModule):
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
         """Energy (*batch,) of ``vertices`` (*batch, V, 3)."""
-        return self.per_triple(vertices).sum(-1)
+        return self.topology.sum_per_mesh(self.per_triple(vertices), self._sums)

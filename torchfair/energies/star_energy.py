@@ -12,7 +12,7 @@ from torch import Tensor
 from .._precision import in_single_at_least
 from ..errors import TorchfairError
 from ..geometry import tangential_shape_operators, vertex_areas
-from ..geometry._unit import in_its_unit
+from ..geometry._unit import in_their_units
 from ..geometry.tangential_shape_operator import Estimator, check_estimator
 from ..topology import Topology
 from .base import MeshModule, Reduction
@@ -39,11 +39,13 @@ def star_terms(
 
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
+        MeshError: if faces around a vertex form several fans.
         TorchfairError: for an unknown estimator or treatment of the boundary.
     """
+    topology.require_fans()
     extrapolation = tables_for(boundary, topology)
     topology.check_vertices(vertices)
-    vertices, unit = in_its_unit(vertices)
+    vertices, unit = in_their_units(vertices, topology, "vertices")
     unit = torch.ones_like(unit) if per_area else unit  # the rest has the unit of a length, or none
     values = norms(tangential_shape_operators(vertices, topology, estimator=estimator, sine=sine))
     if extrapolation is None and not per_area:
@@ -136,4 +138,4 @@ class StarEnergy(MeshModule):
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
         """Energy (*batch,) of ``vertices`` (*batch, V, 3)."""
-        return self.per_vertex(vertices).sum(-1)
+        return self.topology.sum_per_mesh(self.per_vertex(vertices), "vertices")

@@ -88,7 +88,7 @@ def total_absolute_curvature(
         tensor(22.4440, dtype=torch.float64)
     """
     terms = total_absolute_curvature_per_vertex(vertices, topology, sine=sine, estimator=estimator, boundary=boundary)
-    return terms.sum(-1)
+    return topology.sum_per_mesh(terms, "vertices")
 
 
 @safe_to_load

@@ -72,7 +72,7 @@ def total_frobenius_curvature(
         tensor(16.3287, dtype=torch.float64)
     """
     terms = total_frobenius_curvature_per_vertex(vertices, topology, sine=sine, estimator=estimator, boundary=boundary)
-    return terms.sum(-1)
+    return topology.sum_per_mesh(terms, "vertices")
 
 
 @safe_to_load

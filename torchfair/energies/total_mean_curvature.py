@@ -52,7 +52,7 @@ def total_mean_curvature(vertices: Tensor, topology: Topology, edge_weights: Ten
         >>> total_mean_curvature(ball.vertices, ball.topology)  # nearly 8 pi, that of the sphere of radius 2
         tensor(24.9744, dtype=torch.float64)
     """
-    return total_mean_curvature_per_edge(vertices, topology, edge_weights).sum(-1)
+    return topology.sum_per_mesh(total_mean_curvature_per_edge(vertices, topology, edge_weights), "interior_edges")
 
 
 @safe_to_load

@@ -53,7 +53,7 @@ def umbrella_fairness(vertices: Tensor, topology: Topology) -> Tensor:
         >>> umbrella_fairness(mesh.vertices, mesh.topology)
         tensor(0.0721, dtype=torch.float64)
     """
-    return umbrella_fairness_per_vertex(vertices, topology).sum(-1)
+    return topology.sum_per_mesh(umbrella_fairness_per_vertex(vertices, topology), "vertices")
 
 
 @safe_to_load
@@ -80,4 +80,4 @@ class UmbrellaFairness(MeshModule):
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
         """Energy (*batch,) of ``vertices`` (*batch, V, 3)."""
-        return self.per_vertex(vertices).sum(-1)
+        return self.topology.sum_per_mesh(self.per_vertex(vertices), "vertices")

@@ -102,7 +102,7 @@ def willmore_energy(
     terms = willmore_energy_per_vertex(
         vertices, topology, density=density, sine=sine, estimator=estimator, boundary=boundary
     )
-    return terms.sum(-1)
+    return topology.sum_per_mesh(terms, "vertices")
 
 
 @safe_to_load

@@ -7,6 +7,9 @@ import math
 import torch
 from torch import Tensor
 
+from .._topology_tables import Elements
+from ..topology import Topology
+
 _FINE = 14  # binary digits: parts of a mesh that may be so much smaller than its extent
 _TARGET = 10  # the extent, as a power of two, in the unit that is chosen
 
@@ -30,9 +33,8 @@ def unit_of(vertices: Tensor) -> Tensor:
     positions = vertices.detach()
     if not positions.shape[-2]:
         return positions.new_ones(positions.shape[:-2])
-    low, high = ordinary_extents(vertices.dtype)
     coordinates = positions.mT.contiguous()  # twice as fast as reductions over rows
-    return _unit((coordinates.amax(-1) - coordinates.amin(-1)).amax(-1), low, high)
+    return _unit((coordinates.amax(-1) - coordinates.amin(-1)).amax(-1), *ordinary_extents(vertices.dtype))
 
 
 def in_its_unit(vertices: Tensor) -> tuple[Tensor, Tensor]:
@@ -45,6 +47,24 @@ def in_its_unit(vertices: Tensor) -> tuple[Tensor, Tensor]:
     return vertices / unit[..., None], unit
 
 
+def in_their_units(vertices: Tensor, topology: Topology, of: Elements) -> tuple[Tensor, Tensor]:
+    """Like :func:`in_its_unit`, with a unit for each of several joined meshes: that of every element, (*batch, N)."""
+    if not topology.is_joined:
+        return in_its_unit(vertices)
+    units = units_of(vertices.detach().mT, topology.vertex_meshes, topology.num_meshes)
+    scaled = vertices / topology.spread(units, "vertices")[..., None]
+    return scaled, topology.spread(units, of)
+
+
+def units_of(coordinates: Tensor, meshes: Tensor, num_meshes: int) -> Tensor:
+    """(*batch, n) the units of n meshes, of positions (*batch, 3, V) with the mesh (V,) of each."""
+    index = meshes.expand(coordinates.shape)
+    least = coordinates.new_full((*coordinates.shape[:-1], num_meshes), torch.inf)
+    lower = least.scatter_reduce(-1, index, coordinates, "amin")
+    upper = (-least).scatter_reduce(-1, index, coordinates, "amax")
+    return _unit((upper - lower).amax(-2), *ordinary_extents(coordinates.dtype))
+
+
 def _unit(extents: Tensor, low: float, high: float) -> Tensor:
     """1 where an extent is ordinary, zero or no number; else what makes it about ``2 ** _TARGET``."""
     beyond = (extents > high) | ((extents < low) & (extents > 0.0))
@@ -53,8 +73,15 @@ def _unit(extents: Tensor, low: float, high: float) -> Tensor:
     return torch.exp2(torch.where(beyond, powers.clamp(min=least), 0.0))
 
 
-def bring_to_unit(positions: Tensor) -> Tensor:
-    """Divides ``positions`` (3, B, V), coordinates first, in place, and returns the unit (B,)."""
+def bring_to_unit(positions: Tensor, meshes: Tensor | None, num_meshes: int) -> Tensor:
+    """Divides ``positions`` (3, B, V), coordinates first, in place, and returns the unit (B,).
+
+    Where there is a mesh (V,) of each vertex, the units (B, n) of the n meshes.
+    """
+    if meshes is not None:
+        units = units_of(positions.movedim(0, 1), meshes, num_meshes)
+        positions.mul_(units.reciprocal().index_select(-1, meshes))
+        return units
     if not positions.shape[-1]:
         return positions.new_ones(positions.shape[1])
     low, high = ordinary_extents(positions.dtype)

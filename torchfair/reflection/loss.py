@@ -127,12 +127,22 @@ class ReflectionLoss(MeshModule):
 
     @in_single_at_least
     def dissimilarity(self, vertices: Tensor) -> Tensor:
-        """Mean ``1 - SSIM`` (*batch,) over views and stripe directions, 0 where nothing can be compared."""
+        """Mean ``1 - SSIM`` (*batch,) over views and stripe directions, 0 where nothing can be compared.
+
+        Of n joined meshes (*batch, n): each is seen alone, and compared with the one reference.
+        """
+        if not self.topology.is_joined:
+            return self._of_one_mesh(vertices, self.topology)
+        parts = torch.split(vertices, self.topology.mesh_sizes, -2)
+        values = [self._of_one_mesh(part, mesh) for part, mesh in zip(parts, self.topology.meshes, strict=True)]
+        return torch.stack(values, -1) if values else vertices.sum(-1)  # no meshes have no vertices
+
+    def _of_one_mesh(self, vertices: Tensor, topology: Topology) -> Tensor:
         rendering = replace(self.setup, supersampling=1)
-        flat = rendering.flat(vertices, self.topology, antialias=True)
+        flat = rendering.flat(vertices, topology, antialias=True)
         self._render_reference()
         if self.reference_images is None or self.reference_coverage is None:
-            images, _, coverage = rendering.smooth(vertices, self.topology)
+            images, _, coverage = rendering.smooth(vertices, topology)
         else:
             images, coverage = self.reference_images.to(vertices), self.reference_coverage.to(vertices)
         window = comparison_window(flat.coverage.detach(), coverage.detach())
@@ -142,9 +152,12 @@ class ReflectionLoss(MeshModule):
     @in_single_at_least
     def variation(self, vertices: Tensor) -> Tensor:
         """Mean dual reflection variation (*batch,) divided by the square root of the area."""
-        area = face_areas(vertices, self.topology).sum(-1) if self.reference_area is None else self.reference_area
+        area = self.reference_area
+        if area is None:
+            area = self.topology.sum_per_mesh(face_areas(vertices, self.topology), "faces")
         area = area.to(vertices).clamp(min=torch.finfo(vertices.dtype).tiny)
-        return reflection_variation(vertices, self.topology, form="dual").mean(-1) / area.sqrt()
+        views = -2 if self.topology.is_joined else -1
+        return reflection_variation(vertices, self.topology, form="dual").mean(views) / area.sqrt()
 
     def extra_repr(self) -> str:
         """The topology and the choices in words."""

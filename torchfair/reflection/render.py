@@ -135,7 +135,7 @@ def _checked(
     colors, faces = _pictures(
         vertices, topology, normals, around, supersampling, smooth=shading == "smooth", antialias=antialias
     )
-    colors = colors.view(*colors.shape[:-2], height, width, -1).movedim(-1, -3)
+    colors = colors.unflatten(-2, (height, width)).movedim(-1, -3)
     return Reflection(colors[..., :-1, :, :].contiguous(), colors[..., -1, :, :].contiguous(), faces)
 
 
@@ -144,6 +144,17 @@ def _pictures(
 ) -> tuple[Tensor, Tensor]:
     """All pictures, some at a time: (*batch, views, H W, channels + 1), and face numbers of the samples."""
     batch, views = vertices.shape[:-2], around.camera.num_views
+    if not math.prod(batch):  # one mesh tells the shapes
+        one = _pictures(
+            vertices.new_zeros(vertices.shape[-2:]),
+            topology,
+            normals.new_zeros(normals.shape[-2:]),
+            around,
+            factor,
+            **how,
+        )
+        colors, faces = (part.expand(*batch, *part.shape) for part in one)
+        return colors + vertices.sum((-2, -1))[..., None, None, None], faces
     meshes, normals = (part.reshape(math.prod(batch), *part.shape[-2:]) for part in (vertices, normals))
     mesh_step, view_step = _steps(meshes.shape[0], views, height_and_width(around.size))
     rows = []

@@ -118,9 +118,11 @@ def reflection_score(
 
     Raises:
         ShapeError: if a tensor has the wrong shape, for instance a batch.
+        MeshError: if the topology is joined of several meshes.
         TorchfairError: if a vertex is not finite, or for a reference of another kind.
         TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
     """
+    topology.require_one_mesh("reflection_score")
     mesh = one_finite_mesh(vertices, topology)
     if isinstance(reference, ReflectionSetup):
         setup = reference

@@ -13,7 +13,7 @@ from ..energies.base import MeshModule, Reduction, in_words, register
 from ..errors import ShapeError, TorchfairError
 from ..geometry import dual_edge_lengths
 from ..geometry._ops import cross, norm
-from ..geometry._unit import in_its_unit
+from ..geometry._unit import in_their_units
 from ..geometry.lengths import edge_vectors
 from ..geometry.normals import adjacent_normals, normalise
 from ..topology import Topology
@@ -37,7 +37,7 @@ def reflection_variation_per_edge(
     """
     _check_form(form)
     topology.check_vertices(vertices)
-    vertices, unit = in_its_unit(vertices)
+    vertices, unit = in_their_units(vertices, topology, "interior_edges")
     edges = edge_vectors(vertices, topology)[..., : topology.num_interior_edges, :]
     if directions is None:
         directions = axis_directions(torch.eye(3, dtype=vertices.dtype, device=vertices.device))
@@ -52,7 +52,7 @@ def reflection_variation_per_edge(
         # What is divided by a length of zero is zero, with derivative zero.
         densities = 2 * dual_edge_lengths(vertices, topology) / torch.where(lengths > 0, lengths, 1.0)
         terms = across * densities[..., None, :]
-    return see(terms * unit[..., None], visibility, topology)
+    return see(terms * unit[..., None, :], visibility, topology)
 
 
 def reflection_variation(
@@ -94,7 +94,8 @@ def reflection_variation(
             view, such as from :func:`edge_visibility`; 1 if left out, which counts hidden edges too.
 
     Returns:
-        (*batch, n) >= 0, one value per view, same unit as the vertices; scales with them. Zero with derivative
+        (*batch, n) >= 0, one value per view (and one for each of joined meshes behind), same unit as the vertices;
+        scales with them. Zero with derivative
         zero at flat edges (a kink, a subgradient), at edges along the line of sight, of length zero, on the
         boundary or beside a degenerate face (see :func:`torchfair.geometry.face_normals`), and for directions of
         length zero.
@@ -103,9 +104,8 @@ def reflection_variation(
         ShapeError: if a tensor has the wrong shape or is not floating.
         TorchfairError: for an unknown form.
     """
-    return reflection_variation_per_edge(
-        vertices, topology, directions, form=form, visibility=visibility
-    ).sum(-1)  # fmt: skip
+    terms = reflection_variation_per_edge(vertices, topology, directions, form=form, visibility=visibility)
+    return topology.sum_per_mesh(terms, "interior_edges")
 
 
 @safe_to_load
@@ -161,7 +161,7 @@ class ReflectionVariation(MeshModule):
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
         """Mean variation (*batch,) of ``vertices`` (*batch, V, 3)."""
-        return self.per_edge(vertices).sum(-1)
+        return self.topology.sum_per_mesh(self.per_edge(vertices), "interior_edges")
 
     def extra_repr(self) -> str:
         """The topology and the choices in words."""

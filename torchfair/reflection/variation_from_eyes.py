@@ -61,7 +61,8 @@ def reflection_variation_from_eyes(
             out, which counts hidden edges too.
 
     Returns:
-        (*batch, n) >= 0, one value per eye, dimensionless: unchanged by scaling mesh and eyes together. Times the
+        (*batch, n) >= 0, one value per eye (and one for each of joined meshes behind), dimensionless: unchanged
+        by scaling mesh and eyes together. Times the
         distance of the eye it tends to :func:`reflection_variation` as the eye goes away. Terms and derivatives
         are zero at flat edges (a kink), at edges that point at the eye or touch it, and where there is no
         dihedral angle.
@@ -69,7 +70,8 @@ def reflection_variation_from_eyes(
     Raises:
         ShapeError: if a tensor has the wrong shape or is not floating.
     """
-    return reflection_variation_from_eyes_per_edge(vertices, topology, eyes, visibility=visibility).sum(-1)
+    terms = reflection_variation_from_eyes_per_edge(vertices, topology, eyes, visibility=visibility)
+    return topology.sum_per_mesh(terms, "interior_edges")
 
 
 @in_single_at_least

@@ -57,7 +57,7 @@ def pyramid_penalty(vertices: Tensor, topology: Topology) -> Tensor:
     Raises:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
     """
-    return pyramid_penalty_per_vertex(vertices, topology).sum(-1)
+    return topology.sum_per_mesh(pyramid_penalty_per_vertex(vertices, topology), "vertices")
 
 
 @safe_to_load
@@ -85,7 +85,7 @@ class PyramidPenalty(MeshModule):
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
         """Penalty (*batch,) of ``vertices`` (*batch, V, 3)."""
-        return self.per_vertex(vertices).sum(-1)
+        return self.topology.sum_per_mesh(self.per_vertex(vertices), "vertices")
 
 
 @in_single_at_least

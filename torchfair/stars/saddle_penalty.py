@@ -12,7 +12,7 @@ from .._precision import in_single_at_least
 from ..energies.base import MeshModule, Reduction
 from ..errors import MeshError, ShapeError
 from ..geometry._ops import dot, gather
-from ..geometry._unit import in_its_unit
+from ..geometry._unit import in_their_units
 from ..topology import Topology
 from ._groups import star_groups
 from ._saddle_targets import LEAST_EDGES, MOST_TARGET_EDGES, good_patterns, saddle_planes, saddle_sides, star_shape
@@ -76,7 +76,7 @@ def saddle_penalty(vertices: Tensor, topology: Topology, saddles: Tensor | None 
         ShapeError: if ``vertices`` or ``saddles`` has the wrong shape or dtype.
         MeshError: if a chosen vertex lies on the boundary or has fewer than 4 or more than 16 edges.
     """
-    return saddle_penalty_per_vertex(vertices, topology, saddles).sum(-1)
+    return topology.sum_per_mesh(saddle_penalty_per_vertex(vertices, topology, saddles), "vertices")
 
 
 @safe_to_load
@@ -114,7 +114,7 @@ class SaddlePenalty(MeshModule):
 
     def per_mesh(self, vertices: Tensor) -> Tensor:
         """Penalty (*batch,) of ``vertices`` (*batch, V, 3)."""
-        return self.per_vertex(vertices).sum(-1)
+        return self.topology.sum_per_mesh(self.per_vertex(vertices), "vertices")
 
 
 @torch.inference_mode(False)
@@ -145,7 +145,7 @@ def saddle_groups(topology: Topology, saddles: Tensor | None) -> list[SaddleGrou
 @in_single_at_least
 def _per_vertex(vertices: Tensor, topology: Topology, groups: list[SaddleGroup]) -> Tensor:
     topology.check_vertices(vertices)
-    vertices, _ = in_its_unit(vertices)
+    vertices, _ = in_their_units(vertices, topology, "vertices")
     total = vertices.sum(-1) * 0.0  # NaN stays NaN
     for centres, ring, patterns in groups:
         arms = gather(vertices, ring) - gather(vertices, centres)[..., None, :]
