@@ -2,19 +2,22 @@
 
 The parts are imported by name: ``torchfair.geometry``, ``torchfair.energies``, ``torchfair.shapes``,
 ``torchfair.stars``, ``torchfair.subdivision``, ``torchfair.projection``, ``torchfair.constraints``,
-``torchfair.formfinding``, ``torchfair.meshing``, ``torchfair.principal``,
-``torchfair.cameras``, ``torchfair.reflection``, ``torchfair.viewing``, ``torchfair.measuring``,
-``torchfair.progress``. They, and the names below, are loaded with all that they need, torch among it, when they are
-first asked for: what needs none of it, such as the help of the command line, does not wait for it.
+``torchfair.formfinding``, ``torchfair.meshing``, ``torchfair.principal``, ``torchfair.batches``,
+``torchfair.conversions``, ``torchfair.cameras``, ``torchfair.reflection``, ``torchfair.viewing``,
+``torchfair.measuring``, ``torchfair.progress``. They, and the names below, are loaded with all that they need, torch
+among it, when they are first asked for: what needs none of it, such as the help of the command line, does not wait
+for it.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from . import batches as batches
     from . import boundary as boundary
     from . import cameras as cameras
     from . import constraints as constraints
+    from . import conversions as conversions
     from . import creases as creases
     from . import curves as curves
     from . import design as design
@@ -43,6 +46,8 @@ if TYPE_CHECKING:
     from . import topology as topology
     from . import triangulation as triangulation
     from . import viewing as viewing
+    from .batches import MeshBatch as MeshBatch
+    from .batches import collate as collate
     from .energies import AngleVariation as AngleVariation
     from .energies import NormalVariation as NormalVariation
     from .energies import PolylineFairness as PolylineFairness
@@ -67,6 +72,7 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 _NAMES = {
+    "batches": ("MeshBatch", "collate"),
     "energies": (
         *("AngleVariation", "NormalVariation", "PolylineFairness", "TotalAbsoluteCurvature"),
         *("TotalFrobeniusCurvature", "TotalMeanCurvature", "UmbrellaFairness"),
@@ -78,7 +84,19 @@ _NAMES = {
     "topology": ("Topology",),
 }
 _PARTS = (
-    *("boundary", "cameras", "constraints", "creases", "curves", "design", "energies", "errors", "fields"),
+    *(
+        "batches",
+        "boundary",
+        "cameras",
+        "constraints",
+        "conversions",
+        "creases",
+        "curves",
+        "design",
+        "energies",
+        "errors",
+        "fields",
+    ),
     *(
         "formfinding",
         "geometry",

@@ -112,6 +112,7 @@ def pack_faces(faces: object) -> tuple[Ints, Ints]:
             raise MeshError(
                 f"faces: expected an integer array (F, k) or a sequence of index sequences, "
                 f"got an array of shape {faces.shape} and dtype {faces.dtype}"
+                + (". torchfair.batches.MeshBatch.from_padded takes faces of several meshes." * (faces.ndim == 3))
             )
         return _pack_rows(faces.astype(np.int64))
     if not isinstance(faces, Sequence | np.ndarray):
@@ -129,6 +130,9 @@ def pack_faces(faces: object) -> tuple[Ints, Ints]:
 
 def _pack_rows(faces: Ints) -> tuple[Ints, Ints]:
     """Rows of an array (F, k), without the corners -1 at their ends."""
+    there = (faces != -1).any(1)
+    if there.size and not there[-1]:  # rows of padding behind the last face
+        faces = faces[: int(np.flatnonzero(there).max(initial=-1)) + 1]
     count, size = faces.shape
     if not size or not (faces[:, -1] == -1).any():
         return faces.ravel(), np.arange(count + 1, dtype=np.int64) * size

@@ -135,7 +135,7 @@ def _checked(
     colors, faces = _pictures(
         vertices, topology, normals, around, supersampling, smooth=shading == "smooth", antialias=antialias
     )
-    colors = colors.unflatten(-2, (height, width)).movedim(-1, -3)
+    colors = colors.view(*colors.shape[:-2], height, width, colors.shape[-1]).movedim(-1, -3)
     return Reflection(colors[..., :-1, :, :].contiguous(), colors[..., -1, :, :].contiguous(), faces)
 
 
