@@ -18,6 +18,7 @@ import argparse
 import dataclasses
 import io
 import sys
+import tempfile
 import time
 import types
 from collections.abc import Callable, Mapping, Sequence
@@ -26,6 +27,7 @@ from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import torch
+from _processes import rank
 from torch import Tensor
 
 from torchfair import Topology, TorchfairError
@@ -203,7 +205,13 @@ def run_experiment(
         arguments: command-line arguments, by default those of the process.
     """
     config = parse_config(kind, arguments, name=name, description=description or "")
-    folder = Path(config.output or Path("results") / name)
+    if rank():  # of several processes only the first one's results are kept
+        with tempfile.TemporaryDirectory() as folder:
+            return _run(name, config, experiment, files, Path(folder))
+    return _run(name, config, experiment, files, Path(config.output or Path("results") / name))
+
+
+def _run(name: str, config: C, experiment: Callable[[C, Results], Report], files: Sequence[str], folder: Path) -> int:
     threads = torch.get_num_threads()
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)

@@ -17,9 +17,10 @@ from functools import partial
 
 import torch
 from _charts import BLUE, GREEN, ORANGE, add_chart, add_legend
-from _common import ExperimentConfig, Report, Results, run_experiment, setting
+from _common import Report, Results, run_experiment, setting
 from _layouts import IRREGULAR, SADDLES, layout
 from _mirrors import Mirror, mirror_picture, panel_width, panels, smooth_mirror, striped
+from _training import Training, TrainingConfig, train, training_files
 from torch import Tensor
 
 from torchfair import Topology
@@ -46,7 +47,7 @@ MESHES = ("start.obj", "reflection.obj", "score_alone.obj", "energy_alone.obj")
 
 
 @dataclass(frozen=True)
-class Config(ExperimentConfig):
+class Config(TrainingConfig):
     """Settings of the experiment."""
 
     surfaces: tuple[str, ...] = setting(
@@ -54,13 +55,18 @@ class Config(ExperimentConfig):
     )
     rows: int = setting(16, "square root of the number of vertices, about", least=6)
     steps: int = setting(100, "steps of every optimisation", least=1)
-    rate: float = setting(0.02, "learning rate, in edge lengths", least=1e-6)
+    learning_rate: float = setting(0.02, "of Adam, in edge lengths; the same for all steps", least=1e-6)
+    log_every: int = setting(10, "steps between measurements and checkpoints", least=1)
+    dtype: str = setting("float64", "precision", choices=("float64",))
     weight: float = setting(0.1, "weight of the variation", least=0)
     shape: float = setting(10.0, "weight of the penalty on small angles, 0 for none", least=0)
     smallest_angle: float = setting(20.0, "angles in degrees below which it acts", least=0.1)
     size: int = setting(128, "pixels along a picture while optimising", least=32)
     judged_size: int = setting(256, "pixels along the pictures by which meshes are judged", least=32)
-    every: int = setting(10, "steps between measurements", least=1)
+
+    def rate(self, step: int) -> float:
+        """Learning rate of a step."""
+        return self.learning_rate
 
 
 class GlidingMesh(torch.nn.Module):
@@ -124,18 +130,21 @@ def measure(model: GlidingMesh, setup: ReflectionSetup, others: ReflectionSetup)
 
 
 def optimise(
-    model: GlidingMesh, loss: Callable[[Tensor], Tensor], judge: Callable[[], Report], config: Config
-) -> list[Report]:
-    """Steps of Adam; what ``judge`` says at the start and every few steps."""
-    optimiser = torch.optim.Adam([model.shift], lr=config.rate)
-    history = [{"step": 0, **judge()}]
-    for step in range(1, config.steps + 1):
-        optimiser.zero_grad()
-        loss(model()).backward()
-        optimiser.step()
-        if step % config.every == 0 or step == config.steps:
-            history.append({"step": step, **judge()})
-    return history
+    model: GlidingMesh, loss: Callable[[Tensor], Tensor], judge: Callable[[], Report], name: str, config: Config,
+    results: Results,
+) -> tuple[Report, Training]:  # fmt: skip
+    """Steps of Adam, to the state of the least loss; what ``judge`` says at the start and in training."""
+    first = {"step": 0, **judge()}
+
+    def terms() -> dict[str, Tensor]:
+        return {"loss": loss(model())}
+
+    def validate() -> dict[str, float]:
+        return {"validation": float(loss(model())), **{key: float(value) for key, value in judge().items()}}
+
+    generator = torch.Generator()  # nothing is random
+    training = train(model, terms, validate, name=name, config=config, results=results, generator=generator)
+    return first, training
 
 
 def small_angles(vertices: Tensor, topology: Topology, degrees: float) -> Tensor:
@@ -144,8 +153,10 @@ def small_angles(vertices: Tensor, topology: Topology, degrees: float) -> Tensor
     return short.square().sum() / topology.num_vertices
 
 
-def run_surface(name: str, config: Config) -> tuple[dict[str, Report], dict[str, Tensor], SmoothReference, ShapeMesh]:
-    """All losses on one surface: figures and positions by loss."""
+def run_surface(
+    name: str, config: Config, results: Results
+) -> tuple[dict[str, Report], dict[str, Tensor], SmoothReference, ShapeMesh]:
+    """All losses on one surface, until Ctrl-C: figures and positions by loss."""
     reference = SmoothReference.of_surface(SADDLES[name])
     setup = ReflectionSetup.for_reference(reference, size=config.judged_size)
     others = other_views(setup)
@@ -159,14 +170,26 @@ def run_surface(name: str, config: Config) -> tuple[dict[str, Report], dict[str,
         def total(vertices: Tensor, loss: Callable[[Tensor], Tensor] = loss) -> Tensor:
             return loss(vertices) + config.shape * small_angles(vertices, mesh.topology, config.smallest_angle)
 
-        history = optimise(model, total, partial(measure, model, setup, others), config)
-        first, last = history[0], history[-1]
+        run = run_name(name, kind)
+        first, training = optimise(model, total, partial(measure, model, setup, others), run, config, results)
+        last, history = training.best, [first, *training.records]
+        if not training.records:
+            report[kind] = {"start": first, "interrupted": True}
+            break
         changes = {f"{key}_change": float(last[key] / first[key]) - 1
                    for key in ("score", "score_in_other_views", "normal_variation", "wobble")}  # fmt: skip
-        report[kind] = {"start": first, "end": last, **changes, "history": history}
+        interrupted = training.interrupted
+        report[kind] = {"start": first, "end": last, **changes, "history": history, "interrupted": interrupted}
         positions[kind] = model().detach()
         print(f"{name}, {kind}: {describe(report[kind])}")
+        if interrupted:
+            break
     return report, positions, reference, mesh
+
+
+def run_name(surface: str, loss: str) -> str:
+    """Of the files of one training."""
+    return f"{surface}_{('both', 'score', 'energy')[LOSSES.index(loss)]}"
 
 
 def describe(row: Report) -> str:
@@ -177,7 +200,7 @@ def describe(row: Report) -> str:
     return (
         f"score {first['score']:.4f} -> {last['score']:.4f} ({percent['score']}; other views "
         f"{percent['score_in_other_views']}), E {first['normal_variation']:.4f} -> {last['normal_variation']:.4f} "
-        f"({percent['normal_variation']}), {last['flipped_faces']} flipped faces"
+        f"({percent['normal_variation']}), {last['flipped_faces']:.0f} flipped faces"
     )
 
 
@@ -226,9 +249,11 @@ def draw_history(surfaces: dict[str, dict[str, Report]], results: Results) -> No
 
 def experiment(config: Config, results: Results) -> Report:
     """Optimises, measures, draws."""
-    surfaces = {}
+    surfaces: dict[str, dict[str, Report]] = {}
     for number, name in enumerate(config.surfaces):
-        surfaces[name], positions, reference, mesh = run_surface(name, config)
+        surfaces[name], positions, reference, mesh = run_surface(name, config, results)
+        if any(row["interrupted"] for row in surfaces[name].values()):
+            return {"surfaces": surfaces, "interrupted": True}
         if number == 0:
             draw_meshes(positions, reference, mesh, surfaces[name], config, results)
     draw_history(surfaces, results)
@@ -237,7 +262,8 @@ def experiment(config: Config, results: Results) -> Report:
 
 def main(arguments: list[str] | None = None) -> int:
     """The experiment from the command line."""
-    return run_experiment(NAME, __doc__, Config, experiment, [PICTURE, CHART, *MESHES], arguments)
+    trained = [file for name in SADDLES for loss in LOSSES for file in training_files(run_name(name, loss))]
+    return run_experiment(NAME, __doc__, Config, experiment, [PICTURE, CHART, *MESHES, *trained], arguments)
 
 
 if __name__ == "__main__":

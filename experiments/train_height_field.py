@@ -194,6 +194,7 @@ def summary(vertices: Tensor, training: Training, problem: Problem) -> Report:
         "last": training.records[-1] if training.records else None,
         "seconds": training.seconds,
         "interrupted": training.interrupted,
+        "stopped_early": training.stopped_early,
     }
 
 

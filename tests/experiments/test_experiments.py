@@ -252,8 +252,8 @@ def test_reflections_rank_principal_meshes_first_and_variation_is_energy(run: Ru
 
 @pytest.mark.slow
 def test_vertices_slide_until_reflections_are_smoother_without_folding(run: Run, tmp_path: Path) -> None:
-    options = ("--surfaces", "paraboloid", "--rows", "9", "--steps", "12", "--every", "12", "--rate", "0.03",
-               "--size", "64", "--judged-size", "64")  # fmt: skip
+    options = ("--surfaces", "paraboloid", "--rows", "9", "--steps", "12", "--log-every", "12",
+               "--learning-rate", "0.03", "--size", "64", "--judged-size", "64")  # fmt: skip
     losses = run("optimise_reflection", *options)["surfaces"]["paraboloid"]
     both, energy = losses["1 - SSIM and variation"], losses["E alone"]
     assert both["score_change"] < -0.08
@@ -361,6 +361,109 @@ def test_training_with_energy_is_nearer_to_the_surface_and_smoother(run: Run, tm
     lines = [json.loads(line) for line in (tmp_path / "out" / "plain.jsonl").read_text().splitlines()]
     assert [line["step"] for line in lines] == list(range(30, 301, 30))
     assert plain["best"] == min(lines, key=lambda line: line["validation"])
+
+
+# ---- training ------------------------------------------------------------------------------------------
+
+
+def test_patience_ends_a_training_at_its_best(run: Run) -> None:
+    report = run("train_height_field", *TRAINING, "--log-every", "5", "--patience", "2", "--learning-rate", "0.3",
+                 "--noise", "0.5", "--steps", "300")  # fmt: skip
+    plain = report["plain"]
+    assert plain["stopped_early"]
+    assert plain["last"]["step"] == plain["best"]["step"] + 10 < 300
+
+
+def test_gradients_are_clipped_and_half_precision_trains(run: Run) -> None:
+    short = (*TRAINING, "--no-compare", "--steps", "30")
+    plain = run("train_height_field", *short)["regularised"]["last"]
+    clipped = run("train_height_field", *short, "--clip", "1e-9", folder="clipped")["regularised"]["last"]
+    assert clipped != plain  # Adam scales clipped gradients up again, but for its epsilon
+    half = run("train_height_field", *short, "--dtype", "bfloat16", folder="half")["regularised"]["last"]
+    assert half["validation"] == pytest.approx(plain["validation"], rel=0.05)
+
+
+def test_a_longer_course_goes_on_from_the_end_of_a_shorter_one(run: Run, tmp_path: Path) -> None:
+    run("train_height_field", *TRAINING, "--no-compare", "--steps", "30")
+    more = run("train_height_field", *TRAINING, "--no-compare", "--steps", "60", "--resume")["regularised"]
+    assert more["last"]["step"] == 60
+    log = (tmp_path / "out" / "regularised.jsonl").read_text().splitlines()
+    assert [json.loads(line)["step"] for line in log] == [30, 60]
+
+
+def test_events_are_written_where_tensorboard_is(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[tuple[object, ...]] = []
+
+    class SummaryWriter:
+        def __init__(self, folder: str) -> None:
+            written.append(("open", folder))
+
+        def add_scalar(self, *values: object) -> None:
+            written.append(values)
+
+        def close(self) -> None:
+            written.append(("close",))
+
+    module = ModuleType("torch.utils.tensorboard")
+    module.SummaryWriter = SummaryWriter  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", module)
+    report = run("train_height_field", *TRAINING, "--no-compare", "--steps", "30")
+    assert written[0][0] == "open"
+    assert ("validation", report["regularised"]["last"]["validation"], 30) in written
+    assert written[-1] == ("close",)
+
+
+@pytest.mark.slow
+def test_two_processes_train_one_model(tmp_path: Path) -> None:
+    """As torchrun starts them: the same parameters in both, from the mean of the gradients of their batches."""
+    script = FOLDER / "train_height_field.py"
+    options = [*TRAINING, "--no-compare", "--width", "400", "--steps", "60"]
+    results = []
+    for extra in ([], ["--steps", "90", "--resume"]):
+        command = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "--master-port", "29517"]
+        command += [str(script), "--output", str(tmp_path / "out"), *options, *extra]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=FOLDER.parent)
+        assert done.returncode == 0, done.stderr[-2000:]
+        results.append(json.loads((tmp_path / "out" / "result.json").read_text())["regularised"])
+    assert [row["last"]["step"] for row in results] == [60, 90]
+    state = torch.load(tmp_path / "out" / "regularised_last.pt", weights_only=True)
+    assert len(state["generators"]) == 2
+    assert not torch.equal(*state["generators"])
+
+
+def test_the_mean_of_gradients_is_that_of_the_processes(script: Callable[[str], ModuleType]) -> None:
+    processes = script("_processes").Processes(0, 2)
+    module = torch.nn.Linear(2, 1)
+    module.weight.grad = torch.tensor([[1.0, 2.0]])
+
+    def twice(flat: torch.Tensor) -> None:
+        flat += torch.tensor([3.0, 0.0, 5.0])  # what the other process has
+
+    original, torch.distributed.all_reduce = torch.distributed.all_reduce, twice  # type: ignore[assignment]
+    try:
+        processes.average_gradients(module)
+    finally:
+        torch.distributed.all_reduce = original
+    assert module.weight.grad.tolist() == [[2.0, 1.0]]
+    assert module.bias.grad.tolist() == [2.5]
+
+
+def test_ctrl_c_keeps_the_last_whole_step(
+    run: Run, script: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = script("train_height_field")
+    residuals, calls = module.Samples.residuals, []
+
+    def interrupting(self: object, *arguments: object) -> torch.Tensor:
+        calls.append(1)
+        if len(calls) == 43:  # 30 steps, two validations, then the eleventh step after these
+            raise KeyboardInterrupt
+        return residuals(self, *arguments)
+
+    monkeypatch.setattr(module.Samples, "residuals", interrupting)
+    run("train_height_field", *TRAINING, code=130)
+    state = torch.load(tmp_path / "out" / "regularised_last.pt", weights_only=True)
+    assert state["step"] == 40
 
 
 # ---- programs ------------------------------------------------------------------------------------------
