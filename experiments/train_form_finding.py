@@ -1,7 +1,7 @@
 r"""Amortised form-finding: a network from boundary curves to surfaces of small C, trained by the energy itself.
 
-Boundaries are closed curves over a square with random heights; surfaces are height fields over a triangle lattice. The
-network adds to the harmonic surface with the given boundary what lowers C::
+Boundaries are closed curves over a square with random heights. The network moves the inner vertices of the harmonic
+surface with the given boundary, a triangle lattice over the square, so that C falls::
 
     loss = mean over the boundaries of a batch of (C + share * E) / C of the harmonic surface
 
@@ -93,17 +93,14 @@ class Square:
         matrix -= torch.diag(matrix.sum(1))
         return cls(plan, topology, rim, inner, -torch.linalg.solve(matrix[inner][:, inner], matrix[inner][:, rim]))
 
-    def surface(self, rim_heights: Tensor, inner_heights: Tensor) -> Tensor:
-        """Vertices (*batch, V, 3)."""
-        batch = rim_heights.shape[:-1]
-        heights = rim_heights.new_zeros(*batch, self.plan.shape[0])
-        heights = heights.index_copy(-1, self.rim, rim_heights).index_copy(-1, self.inner, inner_heights)
-        plan = self.plan.to(heights).expand(*batch, -1, -1)
-        return torch.cat([plan, heights[..., None]], dim=-1)
-
     def harmonic_surface(self, rim_heights: Tensor) -> Tensor:
         """Vertices (*batch, V, 3) of the surface that the network starts from."""
-        return self.surface(rim_heights, rim_heights @ self.harmonic.to(rim_heights).T)
+        batch = rim_heights.shape[:-1]
+        heights = rim_heights.new_zeros(*batch, self.plan.shape[0])
+        inside = rim_heights @ self.harmonic.to(rim_heights).T
+        heights = heights.index_copy(-1, self.rim, rim_heights).index_copy(-1, self.inner, inside)
+        plan = self.plan.to(heights).expand(*batch, -1, -1)
+        return torch.cat([plan, heights[..., None]], dim=-1)
 
 
 def random_heights(square: Square, count: int, config: Config, generator: torch.Generator) -> Tensor:
@@ -129,15 +126,15 @@ class FormFinder(nn.Module):
         self.square = square
         rim, inner = len(square.rim), len(square.inner)
         self.layers = nn.Sequential(
-            nn.Linear(rim, hidden), nn.SiLU(), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, inner)
+            nn.Linear(rim, hidden), nn.SiLU(), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, 3 * inner)
         )  # fmt: skip
         nn.init.zeros_(self.layers[-1].weight)  # type: ignore[arg-type]
         nn.init.zeros_(self.layers[-1].bias)  # type: ignore[arg-type]
 
     def forward(self, rim_heights: Tensor) -> Tensor:
         """Vertices (*batch, V, 3) of ``rim_heights`` (*batch, n)."""
-        start = rim_heights @ self.square.harmonic.to(rim_heights).T
-        return self.square.surface(rim_heights, start + self.layers(rim_heights))
+        moves = self.layers(rim_heights).unflatten(-1, (-1, 3))
+        return self.square.harmonic_surface(rim_heights).index_add(-2, self.square.inner, moves)
 
 
 # ---- training and comparison ---------------------------------------------------------------------------

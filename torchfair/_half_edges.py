@@ -131,7 +131,7 @@ def pack_faces(faces: object) -> tuple[Ints, Ints]:
 def _pack_rows(faces: Ints) -> tuple[Ints, Ints]:
     """Rows of an array (F, k), without the corners -1 at their ends."""
     there = (faces != -1).any(1)
-    if there.size and not there[-1]:  # rows of padding behind the last face
+    if faces.size and not there[-1]:  # rows of padding behind the last face
         faces = faces[: int(np.flatnonzero(there).max(initial=-1)) + 1]
     count, size = faces.shape
     if not size or not (faces[:, -1] == -1).any():

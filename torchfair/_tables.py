@@ -35,6 +35,10 @@ def outside_of_transforms() -> Iterator[None]:
     """Leaves inference mode, transforms of ``torch.func``, and modes that record, for as long as tables are made."""
     with ExitStack() as stack:
         stack.enter_context(torch.inference_mode(False))
+        tracing = torch._C._get_tracing_state()
+        if tracing is not None:  # of torch.jit.trace
+            torch._C._set_tracing_state(None)  # type: ignore[attr-defined]  # the stubs leave it out
+            stack.callback(torch._C._set_tracing_state, tracing)  # type: ignore[attr-defined]
         if torch._C._are_functorch_transforms_active():
             from torch._functorch.pyfunctorch import temporarily_clear_interpreter_stack
 

@@ -20,6 +20,9 @@ CHEAP_TABLES = ("face_sizes", "is_triangular", "is_quadrangular", "faces_by_size
                 "is_boundary_vertex")  # fmt: skip
 """Filled in with the topology, so that ``torch.compile`` finds them."""
 
+FANS = "_checked_fans"
+"""Set where fans have been looked at."""
+
 JOINED_TABLES = ("vertex_meshes", "edge_meshes", "face_meshes", "_vertex_sums", "_face_sums", "_interior_edge_sums")
 """Likewise, if it is joined."""
 
@@ -281,7 +284,13 @@ class MeshTables:
 
         There are none unless the topology was made with ``manifold="edges"``.
         """
-        self._rings  # noqa: B018
+        if not self.has_fans:
+            self._rings  # noqa: B018
+
+    @property
+    def has_fans(self) -> bool:
+        """Whether it is known that the faces around every vertex form one fan."""
+        return "_rings" in self.__dict__ or bool(self.__dict__.get(FANS, False))
 
     @cached_table
     def rings_by_valence(self) -> dict[int, tuple[Tensor, Tensor]]:

@@ -15,7 +15,7 @@ from . import _connectivity, _joined_topology
 from ._loading import safe_to_load
 from ._packed_tensors import pack, unpack
 from ._tables import cached_table, outside_of_transforms
-from ._topology_tables import CHEAP_TABLES, JOINED_TABLES, MeshTables
+from ._topology_tables import CHEAP_TABLES, FANS, JOINED_TABLES, MeshTables
 from .errors import MeshError, ShapeError
 
 Manifold = Literal["vertices", "edges"]
@@ -118,7 +118,7 @@ class Topology(MeshTables):
         with outside_of_transforms():
             tensors = {name: torch.from_numpy(np.ascontiguousarray(a, np.int64)) for name, a in arrays.items()}
             topology = cls(num_vertices=half.num_vertices, **tensors)
-            topology.__dict__.update(twins=torch.from_numpy(edges.twins))
+            topology.__dict__.update({"twins": torch.from_numpy(edges.twins), FANS: manifold == "vertices"})
         return topology
 
     @classmethod
@@ -143,14 +143,19 @@ class Topology(MeshTables):
         """
         parts = _joined_topology.checked_parts(topologies, cls)
         with outside_of_transforms():
-            return cls(sum(part.num_vertices for part in parts), **_joined_topology.joined_tensors(parts))
+            joined = cls(sum(part.num_vertices for part in parts), **_joined_topology.joined_tensors(parts))
+        joined.__dict__[FANS] = all(part.has_fans for part in parts)
+        return joined
 
     @cached_table
     def meshes(self) -> tuple[Topology, ...]:
         """The topologies of the meshes that this one is joined of, in order; itself if it is one mesh."""
         if not self.is_joined:
             return (self,)
-        return tuple(Topology(count, **tensors) for count, tensors in _joined_topology.split_tensors(self))
+        parts = tuple(Topology(count, **tensors) for count, tensors in _joined_topology.split_tensors(self))
+        for part in parts:
+            part.__dict__[FANS] = self.has_fans
+        return parts
 
     # ---- comparing, copying and moving -----------------------------------------------------------------
 
@@ -189,10 +194,12 @@ class Topology(MeshTables):
     def __getstate__(self) -> dict[str, object]:
         """What copies and pickles hold: one tensor, so that processes share one file; no tables that are made of it."""
         tensors = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "num_vertices"}
-        return {"num_vertices": self.num_vertices, **pack({n: t for n, t in tensors.items() if t is not None})}
+        packed = pack({name: tensor for name, tensor in tensors.items() if tensor is not None})
+        return {"num_vertices": self.num_vertices, "has_fans": self.has_fans, **packed}
 
     def __setstate__(self, state: dict[str, object]) -> None:
-        self.__dict__.update(mesh_offsets=None, num_vertices=state.pop("num_vertices"))
+        known = {"mesh_offsets": None, "num_vertices": state["num_vertices"], FANS: state["has_fans"]}
+        self.__dict__.update(known)
         with outside_of_transforms():
             self.__dict__.update(unpack(state))
             self.__post_init__()
@@ -204,7 +211,9 @@ class Topology(MeshTables):
             changed: dict[str, Any] = {
                 name: None if tensor is None else function(tensor) for name, tensor in tensors.items()
             }
-            return Topology(self.num_vertices, **changed)
+            moved = Topology(self.num_vertices, **changed)
+        moved.__dict__[FANS] = self.has_fans
+        return moved
 
     def to(self, device: torch.device | str) -> Topology:
         """The same topology with its tensors on ``device``."""

@@ -364,3 +364,19 @@ def test_antialiased_pixels_are_the_limit_of_many_samples(scene, kind: type[Orth
     assert torch.allclose(mean.coverage, samples.coverage, atol=row)
     if camera.near is None:
         assert torch.allclose(mean.image, samples.image, atol=row)
+
+
+@pytest.mark.parametrize("shading", ["flat", "smooth"])
+@pytest.mark.parametrize("batch", [(0,), (2, 0)])
+def test_no_meshes_have_no_pictures(shading: str, batch: tuple[int, ...]) -> None:
+    vertices, topology = wavy_grid(4, 4)
+    nothing = vertices.expand(*batch, -1, -1).clone().requires_grad_()
+    camera = straight_down(2.0)
+    one = render_reflection(vertices, topology, camera, STRIPES, size=(6, 8), shading=shading)  # type: ignore[arg-type]
+    found = render_reflection(nothing, topology, camera, STRIPES, size=(6, 8), shading=shading)  # type: ignore[arg-type]
+    for empty, full in zip(found, one, strict=True):
+        assert empty.shape == (*batch, *full.shape)
+        assert empty.dtype == full.dtype
+    found[0].sum().backward()
+    assert nothing.grad is not None
+    assert nothing.grad.shape == nothing.shape

@@ -82,6 +82,7 @@ class StarEnergy(MeshModule):
         extrapolation: tables of the boundary, on the device of the topology; None for an open boundary.
 
     Raises:
+        MeshError: if faces around a vertex form several fans.
         TorchfairError: for an unknown estimator or treatment of the boundary.
     """
 
@@ -98,6 +99,7 @@ class StarEnergy(MeshModule):
         reduction: Reduction = "none",
     ) -> None:
         super().__init__(topology, reduction=reduction)
+        topology.require_fans()
         check_estimator(estimator)
         self.sine = sine
         self.estimator: Estimator = estimator
