@@ -22,6 +22,7 @@ import torch
 
 import torchfair
 from torchfair import Topology
+from torchfair.energies import normal_variation
 from torchfair.io import load_mesh, save_mesh
 from torchfair.polylines import mesh_polylines, straight_triples
 from torchfair.repair import repair_mesh
@@ -53,7 +54,12 @@ def jobs(vertices: torch.Tensor, faces: np.ndarray, folder: Path) -> dict[str, C
     topology = Topology.from_faces(faces)
     turned = np.random.default_rng(1).random(len(faces)) < 0.3
     damaged = np.where(turned[:, None], faces[:, ::-1], faces)
-    named: dict[str, Callable[[], object]] = {"Topology.from_faces": lambda: Topology.from_faces(faces)}
+    named: dict[str, Callable[[], object]] = {
+        "Topology.from_faces": lambda: Topology.from_faces(faces),
+        "  manifold edges only": lambda: Topology.from_faces(faces, manifold="edges"),
+        "  and E on it, once": lambda: normal_variation(vertices, Topology.from_faces(faces, manifold="edges")),
+        "E on a kept topology": lambda: normal_variation(vertices, topology),
+    }
     for label, name, binary in (("OBJ", "m.obj", False), ("PLY text", "t.ply", False), ("PLY binary", "b.ply", True)):
         path = folder / name
 

@@ -7,7 +7,7 @@ surface with the given boundary, a triangle lattice over the square, so that C f
 
 No solved example is needed. E is there because C does not see zigzags. On boundaries that were not trained on the
 network is compared with the solver (``minimise_absolute_curvature``), which starts from the harmonic surface and from
-that of the network: C, seconds, and the steps until C is within a per cent of the best.
+that of the network: C, seconds, and the steps until C is within a per cent of where the first of them ends.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import math
 import sys
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from _common import Report, Results, run_experiment, setting
@@ -39,18 +40,18 @@ SURFACES = ("harmonic", "network", "solver")
 class Config(TrainingConfig):
     """Settings of the experiment."""
 
-    steps: int = setting(600, "optimiser steps", least=1)
-    learning_rate: float = setting(0.002, "of Adam at the start; falls to 0 like half a cosine wave", least=0)
-    log_every: int = setting(50, "steps between log lines, validations and checkpoints", least=1)
+    steps: int = setting(1200, "optimiser steps", least=1)
+    learning_rate: float = setting(0.003, "of Adam at the start; falls to 0 like half a cosine wave", least=0)
+    log_every: int = setting(100, "steps between log lines, validations and checkpoints", least=1)
     dtype: str = setting("float32", "precision", choices=("float32", "float64"))
     rows: int = setting(11, "vertices along a side of the square", least=4)
-    waves: int = setting(3, "highest frequency of the heights along the boundary", least=1)
-    height: float = setting(0.5, "standard deviation of the heights; the square has sides of 2", least=0)
+    waves: int = setting(2, "highest frequency of the heights along the boundary", least=1)
+    height: float = setting(0.4, "standard deviation of the heights; the square has sides of 2", least=0)
     batch: int = setting(16, "boundaries per step", least=1)
-    hidden: int = setting(128, "width of the network", least=1)
-    share: float = setting(0.05, "of E in the loss", least=0)
+    hidden: int = setting(192, "width of the network", least=1)
+    share: float = setting(0.02, "of E in the loss", least=0)
     validation_boundaries: int = setting(64, "boundaries to choose the best state by", least=1)
-    unseen: int = setting(6, "boundaries to compare with the solver on", least=1)
+    unseen: int = setting(8, "boundaries to compare with the solver on", least=1)
 
 
 # ---- surfaces over a square ----------------------------------------------------------------------------
@@ -194,15 +195,12 @@ def compare(model: FormFinder, square: Square, config: Config) -> tuple[Report, 
         warm, warm_course, warm_seconds = solve(found[number], square)
         surfaces = {"harmonic": start, "network": found[number], "solver": cold, "solver, warm": warm}
         values = {name: float(curvature(vertices)) for name, vertices in surfaces.items()}
-        best = min(values["solver"], values["solver, warm"])
+        goal = 1.01 * values["solver"]
         row = {**values, "cold_seconds": cold_seconds, "warm_seconds": warm_seconds}
-        row |= {
-            "cold_steps": steps_until(1.01 * best, cold_course),
-            "warm_steps": steps_until(1.01 * best, warm_course),
-        }
-        row |= {"cold_steps_in_all": len(cold_course), "warm_steps_in_all": len(warm_course)}
+        row |= {"cold_steps": steps_until(goal, cold_course), "warm_steps": steps_until(goal, warm_course)}
         rows.append(row)
         first = first or {name: surfaces[name] for name in SURFACES}
+    reached = [row for row in rows if row["warm_steps"] is not None and row["cold_steps"] is not None]
     gaps = [row["network"] / min(row["solver"], row["solver, warm"]) - 1 for row in rows]
     report = {
         "rows": rows,
@@ -212,8 +210,9 @@ def compare(model: FormFinder, square: Square, config: Config) -> tuple[Report, 
         "largest_network_gap": max(gaps),
         "cold_seconds": _mean([row["cold_seconds"] for row in rows]),
         "warm_seconds": _mean([row["warm_seconds"] for row in rows]),
-        "cold_steps_in_all": _mean([row["cold_steps_in_all"] for row in rows]),
-        "warm_steps_in_all": _mean([row["warm_steps_in_all"] for row in rows]),
+        "cold_steps": _mean([row["cold_steps"] for row in reached]),
+        "warm_steps": _mean([row["warm_steps"] for row in reached]),
+        "warm_start_reaches_the_goal": len(reached) / len(rows),
         "warm_better_by": _mean([row["solver"] / row["solver, warm"] - 1 for row in rows]),
     }
     return report, first
@@ -224,8 +223,8 @@ def steps_until(goal: float, course: list[float]) -> int | None:
     return next((step for step, value in enumerate(course, 1) if value <= goal), None)
 
 
-def _mean(values: list[float]) -> float:
-    return sum(values) / len(values)
+def _mean(values: list[Any]) -> float:
+    return sum(values) / len(values) if values else math.nan
 
 
 def draw_surfaces(surfaces: dict[str, Tensor], square: Square, width: int, results: Results) -> None:
@@ -256,8 +255,10 @@ def experiment(config: Config, results: Results) -> Report:
     print(
         f"C of the network {100 * found['network_gap']:.1f} % above the solver's (harmonic surface "
         f"{100 * (found['harmonic_over_solver'] - 1):.1f} %), {1e3 * found['network_seconds']:.2f} ms against "
-        f"{found['cold_seconds']:.2f} s; steps {found['cold_steps_in_all']:.0f} cold, "
-        f"{found['warm_steps_in_all']:.0f} warm"
+        f"{found['cold_seconds']:.2f} s; steps of the solver until C is within 1 % of its own result: "
+        f"{found['cold_steps']:.1f} from the harmonic surface, {found['warm_steps']:.1f} from the network "
+        f"({100 * found['warm_start_reaches_the_goal']:.0f} % of {config.unseen} get there); from the network it ends "
+        f"{100 * found['warm_better_by']:.1f} % lower"
     )
     draw_surfaces(surfaces, square, config.width, results)
     for name, vertices in surfaces.items():

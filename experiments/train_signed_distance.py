@@ -58,7 +58,7 @@ class Config(TrainingConfig):
     batch: int = setting(500, "samples per step", least=1)
     warm_up: int = setting(30, "steps without regulariser", least=0)
     weight: float = setting(1e-3, "of E over C", least=0)
-    laplacian_weight: float = setting(0.03, "of the Laplacian loss", least=0)
+    laplacian_weight: float = setting(0.003, "of the Laplacian loss", least=0)
     runs: tuple[str, ...] = setting(RUNS, "regularisers to compare", choices=RUNS)
 
 

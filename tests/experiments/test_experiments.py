@@ -18,7 +18,7 @@ from helpers import DOUBLE
 
 from torchfair import Topology
 from torchfair.formfinding.denoise.measures import volume
-from torchfair.geometry import angle_defects, corner_angles, planarity
+from torchfair.geometry import angle_defects, corner_angles, face_area_vectors, planarity
 from torchfair.io import load_mesh
 
 FOLDER = Path(__file__).parents[2] / "experiments"
@@ -361,6 +361,56 @@ def test_training_with_energy_is_nearer_to_the_surface_and_smoother(run: Run, tm
     lines = [json.loads(line) for line in (tmp_path / "out" / "plain.jsonl").read_text().splitlines()]
     assert [line["step"] for line in lines] == list(range(30, 301, 30))
     assert plain["best"] == min(lines, key=lambda line: line["validation"])
+
+
+def test_a_surface_of_changing_faces_is_smoother_with_energy(run: Run, tmp_path: Path) -> None:
+    options = ("--nodes", "11", "--steps", "60", "--log-every", "20", "--samples", "400", "--noise", "0.1",
+               "--warm-up", "5", "--weight", "0.003", "--runs", "plain", "normal_variation")  # fmt: skip
+    report = run("train_signed_distance", *options)
+    plain, regularised = report["plain"]["records"][-1], report["normal_variation"]["records"][-1]
+    assert regularised["normal_variation_over_c"] < 0.9 * plain["normal_variation_over_c"]
+    assert load_mesh(tmp_path / "out" / "normal_variation.obj").topology.num_faces > 100
+
+
+def test_a_network_finds_forms_of_less_curvature_than_it_starts_from(run: Run, tmp_path: Path) -> None:
+    options = ("--rows", "6", "--steps", "150", "--log-every", "50", "--hidden", "32", "--unseen", "1",
+               "--validation-boundaries", "8")  # fmt: skip
+    report = run("train_form_finding", *options)
+    records = report["training"]["records"]
+    assert records[-1]["c_over_harmonic"] < records[0]["c_over_harmonic"] < 1.0
+    (row,) = report["unseen"]["rows"]
+    assert row["solver"] < row["network"] < row["harmonic"]
+    start, found = (load_mesh(tmp_path / "out" / f"{name}.obj") for name in ("harmonic", "network"))
+    rim = start.topology.is_boundary_vertex
+    torch.testing.assert_close(found.vertices[rim], start.vertices[rim], rtol=0, atol=1e-6)
+
+
+def test_marching_tetrahedra_give_closed_meshes_that_follow_the_values(script: Callable[[str], ModuleType]) -> None:
+    marching = script("_marching")
+    nodes = marching.lattice(13, 1.0)
+    radius = torch.linalg.vector_norm(nodes, dim=1)
+    values = (radius - 0.713).requires_grad_()
+    vertices, topology = marching.zero_surface(values, nodes, 13)
+    topology.require_fans()
+    counts = (topology.num_vertices - topology.num_edges + topology.num_faces, len(topology.boundary_loops()))
+    assert counts == (2, 0)
+    firsts = vertices[topology.corners[topology.face_offsets[:-1]]]
+    inside = (face_area_vectors(vertices, topology) * firsts).sum() / 3
+    assert inside.item() == pytest.approx(4 / 3 * math.pi * 0.713**3, rel=0.02)  # positive: normals point outward
+    assert (torch.linalg.vector_norm(vertices, dim=1) - 0.713).abs().max() < 0.02
+    assert planarity(vertices, topology).max() < 1e-12
+    (slope,) = torch.autograd.grad(inside, values)
+    assert (slope < 1e-12).all()  # where values rise, the body shrinks
+    area = 4 * math.pi * 0.713**2  # by how much it does if all rise alike, as their slope is one
+    assert float(slope.sum()) == pytest.approx(-area, rel=0.03)
+
+
+@pytest.mark.parametrize("value", [1.0, -1.0])
+def test_no_surface_is_an_empty_mesh(script: Callable[[str], ModuleType], value: float) -> None:
+    marching = script("_marching")
+    nodes = marching.lattice(5, 1.0)
+    vertices, topology = marching.zero_surface(torch.full((125,), value), nodes, 5)
+    assert (vertices.shape, topology.num_faces) == ((0, 3), 0)
 
 
 # ---- training ------------------------------------------------------------------------------------------
