@@ -35,7 +35,8 @@ def test_every_digit_and_every_polygon_comes_back(rhino: Any, tmp_path: Path) ->
     mesh = load_mesh(tmp_path / "m.3dm")
     assert mesh.vertices.equal(vertices)
     assert mesh.topology.face_lists() == faces
-    assert mesh.notes == ()
+    count, inner = topology.num_edges, topology.num_interior_edges
+    assert [note.split(" are")[0] for note in mesh.notes] == [f"most edges ({count - inner} of {count})"]
 
 
 def test_unit_layers_and_names_come_back(rhino: Any, tmp_path: Path) -> None:

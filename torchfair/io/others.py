@@ -14,6 +14,7 @@ from .raw_mesh import Origin, RawMesh, assemble
 from .stl import write_stl
 
 READ = (".glb", ".gltf", ".dae", ".3mf")
+_PACKAGES = {".dae": "pycollada", ".3mf": "lxml networkx"}  # which trimesh reads with
 WRITTEN = (".stl", ".glb")
 
 
@@ -21,7 +22,7 @@ def read_other(path: Path) -> RawMesh:
     """Mesh of a file that trimesh knows, with ``process=False``: vertices and faces as trimesh finds them.
 
     Raises:
-        MeshFileError: whatever trimesh raises.
+        MeshFileError: whatever trimesh raises; a package that it reads with is not installed.
     """
     try:
         import trimesh
@@ -31,10 +32,14 @@ def read_other(path: Path) -> RawMesh:
             loaded: Any = trimesh.load(str(path), process=False, force="mesh")
             points = np.asarray(loaded.vertices, np.float64).reshape(-1, 3)
             faces = np.asarray(loaded.faces, np.int64).reshape(-1, 3)
+    except ImportError as error:
+        packages = _PACKAGES.get(path.suffix.lower(), "trimesh")
+        raise MeshFileError(path, f"needs more packages ({error}): pip install {packages}. Or save as OBJ") from None
     except Exception as error:  # trimesh lets through whatever its parsers raise
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise MeshFileError(path, f"trimesh cannot read it ({reason})") from None
-    return assemble(Origin(path), points, faces.ravel(), np.full(len(faces), 3, np.int64))
+    raw = assemble(Origin(path), points, faces.ravel(), np.full(len(faces), 3, np.int64))
+    return raw._replace(split=True)
 
 
 def write_other(mesh: RawMesh, suffix: str) -> bytes:

@@ -41,6 +41,7 @@ class RawMesh(NamedTuple):
     names: Names = FROM_ZERO
     notes: tuple[str, ...] = ()  # what was left out, or read in spite of a fault
     attributes: ObjAttributes | RhinoParts | None = None  # of OBJ and 3DM files
+    split: bool = False  # of a format that repeats vertices where faces differ in normals, textures or materials
 
 
 def assemble(origin: Origin, points: Floats, corners: Ints, sizes: Ints) -> RawMesh:

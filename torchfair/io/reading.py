@@ -30,6 +30,7 @@ _READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {
     ".stl": read_stl,
     ".3dm": read_rhino,
 }
+_SPLIT = "files of this format repeat vertices where normals, textures or materials differ: "
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"PK\x03\x04": "zip", b"BZh": "bzip2", b"\xfd7zXZ\0": "xz"}
 
 
@@ -41,15 +42,17 @@ def load_mesh(
     The format follows from the extension, upper or lower case. OBJ, OFF and PLY (text and binary) keep polygons, vertex
     order and orientation exactly. Corners of STL files at the same position become one vertex where an edge joins them.
     3DM files hold their visible meshes in one (with the package rhino3dm). GLB, GLTF, DAE and 3MF go through trimesh
-    with ``process=False``. Vertices that no face uses are legal. Edges of the boundary that lie on each other are told
-    in ``PolygonMesh.notes``.
+    with ``process=False``, and are welded as by ``weld=True``, with a note: such files repeat vertices where normals,
+    textures or materials differ. Vertices that no face uses are legal. Edges of the boundary that lie on each other are
+    told in ``PolygonMesh.notes``, and so is a mesh most of whose edges are boundary.
 
     Args:
         path: the file.
         repair: whether to pass the mesh through :func:`torchfair.repair_mesh`; what that did is in
             ``PolygonMesh.repairs``, in the numbers of the file.
         weld: whether edges of the boundary at the same place become one, see :func:`torchfair.repair_mesh`: True, or
-            the largest distance in the unit of the file. Without ``repair`` nothing else is done.
+            the largest distance in the unit of the file. Without ``repair`` nothing else is done. In GLB, GLTF, DAE
+            and 3MF files False stands for True; 0.0 joins only what is at the same place to the last bit.
         split_edges: whether to repair, and to split edges of more than two faces, too.
 
     Raises:
@@ -75,6 +78,8 @@ def load_mesh(
 def _made(raw: RawMesh, repair: bool, weld: bool | float, split_edges: bool) -> PolygonMesh:
     vertices = torch.from_numpy(raw.points)
     faces = raw.corners, raw.offsets
+    as_it_comes = not repair and weld is False
+    weld = True if raw.split and weld is False else weld
     if not repair and weld is False:
         mesh = PolygonMesh(vertices, Topology.from_packed_faces(*faces, len(raw.points)), (), raw.notes, raw.names)
         mesh = replace(mesh, attributes=raw.attributes)
@@ -85,20 +90,33 @@ def _made(raw: RawMesh, repair: bool, weld: bool | float, split_edges: bool) -> 
             mended = weld_packed(vertices, *faces, weld)
         kept = [part.numpy() for part in (mended.kept_vertices, mended.kept_faces, mended.kept_corners)]
         same = len(kept[0]) == len(raw.points) and bool((kept[0] == np.arange(len(kept[0]))).all())
+        done = tuple(sentence.told(raw.names) for sentence in mended.sentences)
         mesh = PolygonMesh(
             mended.vertices,
             mended.topology,
-            tuple(sentence.told(raw.names) for sentence in mended.sentences),
-            raw.notes,
+            () if as_it_comes else done,
+            (*raw.notes, *(_SPLIT + sentence for sentence in done)) if as_it_comes else raw.notes,
             replace(raw.names, vertices=kept[0], faces=kept[1]),
             None if same else mended.vertex_map,
             raw.attributes and raw.attributes.of_repaired(*kept),
         )
     seams = coincident_edges(mesh.vertices, mesh.topology)
-    if seams is None:
-        return mesh
-    hint = " weld=True (--weld on the command line) joins them." if weld is False else ""
-    return replace(mesh, notes=(*mesh.notes, seams.told(mesh.names) + hint))
+    told = []
+    if seams is not None:
+        hint = " weld=True (--weld on the command line) joins them." if weld is False else ""
+        told.append(seams.told(mesh.names) + hint)
+    told += _mostly_open(mesh.topology, seams is None)
+    return replace(mesh, notes=(*mesh.notes, *told))
+
+
+def _mostly_open(topology: Topology, apart: bool) -> list[str]:
+    """Says so where most edges are boundary; ``apart``: none of them lie on each other."""
+    count, inner = topology.num_edges, topology.num_interior_edges
+    if 2 * inner >= count:
+        return []
+    words = f"most edges ({count - inner} of {count}) are boundary, and those carry no E."
+    why = " If its faces are meant to touch, they are farther apart than is welded by default."
+    return [words + (why if apart else "")]
 
 
 def _remedy(raw: RawMesh, repair: bool, weld: bool | float, split_edges: bool) -> str:
