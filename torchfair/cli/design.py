@@ -46,7 +46,7 @@ def add_parser(subparsers: Any) -> None:
     add("--frame", action="append", default=[], metavar="ORIGIN", help="let pages of this origin, such as a notebook "
         "server, show the page in a frame; repeatable")  # fmt: skip
     add("--upload", type=count, default=128, metavar="MIB", help="largest file that may be dropped (default 128)")
-    add_repair(parser)
+    add_repair(parser, surfaces=False)
     parser.set_defaults(run=run, name=NAME)
 
 

@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 
 WELD = "--weld"
 _DEFAULT = "auto"
+_READ = {"repair": False, "weld": False, "split_edges": False, "surfaces": None}
 
 
-def add_repair(parser: argparse.ArgumentParser) -> None:
-    """The options to weld and repair what is read."""
+def add_repair(parser: argparse.ArgumentParser, *, surfaces: bool = True) -> None:
+    """The options to weld and repair what is read, and to sample surfaces."""
     add = parser.add_argument
     add("--repair", action="store_true", help="first drop repeated corners, double faces, faces without area and "
         "unused vertices, join T-junctions, split vertices that fans share, and orient faces consistently")  # fmt: skip
@@ -26,11 +27,18 @@ def add_repair(parser: argparse.ArgumentParser) -> None:
         "boundary at the same place one edge; TOLERANCE is a distance (default: 1e-6 of the extent, or rounding to "
         "single precision)")  # fmt: skip
     add("--split-edges", action="store_true", help="repair, and split edges of more than two faces into pairs of faces")
+    if surfaces:
+        _add_surfaces(parser)
+
+
+def _add_surfaces(parser: argparse.ArgumentParser) -> None:
+    words = "sample surfaces of 3DM files, too, by grids of N by M cells (default of M: N)"
+    parser.add_argument("--surfaces", type=_cells, metavar="N[,M]", help=words)
 
 
 def read_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """What :func:`add_repair` has added, as arguments of :func:`~torchfair.io.load_mesh`."""
-    return {name: getattr(arguments, name, False) for name in ("repair", "weld", "split_edges")}
+    return {name: getattr(arguments, name, default) for name, default in _READ.items()}
 
 
 def _tolerance(text: str) -> float | bool:
@@ -44,6 +52,14 @@ def _tolerance(text: str) -> float | bool:
     if not 0.0 <= value < math.inf:
         raise argparse.ArgumentTypeError(f"expected a distance of at least 0, got {text!r}")
     return value
+
+
+def _cells(text: str) -> int | tuple[int, int]:
+    """How many cells a surface gets, in one or two numbers."""
+    words = text.split(",")
+    if len(words) not in (1, 2) or not all(word.isascii() and word.isdigit() and int(word) > 0 for word in words):
+        raise argparse.ArgumentTypeError(f"expected whole numbers of at least 1, such as 40 or 40,20, got {text!r}")
+    return int(words[0]) if len(words) == 1 else (int(words[0]), int(words[1]))
 
 
 def with_default_tolerance(words: Sequence[str]) -> list[str]:

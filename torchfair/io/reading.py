@@ -21,6 +21,7 @@ from .ply import read_ply
 from .polygon_mesh import PolygonMesh
 from .raw_mesh import RawMesh
 from .rhino import read_rhino
+from .rhino_surfaces import Cells, checked_cells
 from .stl import read_stl
 
 _READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {
@@ -35,7 +36,12 @@ _COMPRESSED = {b"\x1f\x8b": "gzip", b"PK\x03\x04": "zip", b"BZh": "bzip2", b"\xf
 
 
 def load_mesh(
-    path: str | os.PathLike[str], *, repair: bool = False, weld: bool | float = False, split_edges: bool = False
+    path: str | os.PathLike[str],
+    *,
+    repair: bool = False,
+    weld: bool | float = False,
+    split_edges: bool = False,
+    surfaces: int | tuple[int, int] | None = None,
 ) -> PolygonMesh:
     """The polygon mesh of a file.
 
@@ -54,15 +60,19 @@ def load_mesh(
             the largest distance in the unit of the file. Without ``repair`` nothing else is done. In GLB, GLTF, DAE
             and 3MF files False stands for True; 0.0 joins only what is at the same place to the last bit.
         split_edges: whether to repair, and to split edges of more than two faces, too.
+        surfaces: 3DM files only: the surfaces in it are sampled, too, by a grid in their parameters with so many cells
+            in each direction, or in the first and the second; lines where a surface may have a kink are added. Its
+            points are exact. Seams of closed surfaces are closed, poles are single vertices. Faces of polysurfaces
+            meet in edges only where their grids do; ``weld`` joins them there, with the tolerance of the model.
 
     Raises:
         MeshFileError: for every fault of the file and of its mesh, with the line number where there is one, in the
-            numbers of the file (from 1 in OBJ files), with what mends it.
-        SettingsError: ``weld`` is no distance.
+            numbers of the file (from 1 in OBJ files), with what mends it; for trimmed surfaces that are to be sampled.
+        SettingsError: ``weld`` is no distance, or ``surfaces`` no number of cells.
         TorchfairError: rhino3dm, which reads 3DM files, is not installed.
     """
     path = Path(path)
-    raw = _read_raw(path)
+    raw = _read_raw(path, None if surfaces is None else checked_cells(surfaces))
     repair = repair or split_edges
     try:
         mesh = _made(raw, repair, weld, split_edges)
@@ -133,7 +143,7 @@ def _remedy(raw: RawMesh, repair: bool, weld: bool | float, split_edges: bool) -
     return ""
 
 
-def _read_raw(path: Path) -> RawMesh:
+def _read_raw(path: Path, surfaces: Cells | None) -> RawMesh:
     suffix = path.suffix.lower()
     if suffix not in (*_READERS, *others.READ):
         known = ", ".join((*_READERS, *others.READ))
@@ -143,7 +153,7 @@ def _read_raw(path: Path) -> RawMesh:
         for magic, name in _COMPRESSED.items():
             if data.startswith(magic):
                 raise MeshFileError(path, f"is compressed with {name}. Decompress it first")
-        return _READERS[suffix](path, data)
+        return read_rhino(path, data, surfaces) if suffix == ".3dm" else _READERS[suffix](path, data)
     return others.read_other(path)
 
 

@@ -16,14 +16,17 @@ from typing import Any
 import numpy as np
 import torch
 
+from .._names import first_few
 from ..errors import MeshFileError, TorchfairError
 from ..topology import Topology
 from ..triangulation import triangulate
 from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
 from .rhino_parts import UNITLESS, RhinoParts
+from .rhino_surfaces import Cells, Patch, patches_of, sampled
 
 _NGONS = "torchfair ngons"
 _VERSION = 7
+_SAMPLE = "surfaces=N (--surfaces N on the command line), N cells in each direction"
 _MOST_NESTED = 32  # blocks in blocks
 
 
@@ -54,11 +57,11 @@ def rhino_model(path: Path) -> tuple[Any, Any]:
     return rhino, model
 
 
-def read_rhino(path: Path, data: bytes) -> RawMesh:
-    """All visible meshes of a 3DM file in one, blocks where they are inserted.
+def read_rhino(path: Path, data: bytes, surfaces: Cells | None = None) -> RawMesh:
+    """All visible meshes of a 3DM file in one, blocks where they are inserted; surfaces too, by grids of cells.
 
     Raises:
-        MeshFileError: it cannot be read, or has no mesh.
+        MeshFileError: it cannot be read, has no mesh, or trimmed surfaces that are to be sampled.
         TorchfairError: rhino3dm is not installed.
     """
     rhino, model = rhino_model(path)
@@ -67,29 +70,40 @@ def read_rhino(path: Path, data: bytes) -> RawMesh:
     objects: list[tuple[str, str]] = []
     owners: list[int] = []
     others: Counter[str] = Counter()
-    count = 0
+    trimmed: list[str] = []
+    patches = count = 0
     for item, place in _items(rhino, model):
-        mesh = item.Geometry
-        if not isinstance(mesh, rhino.Mesh):
-            others[type(mesh).__name__] += 1
+        name, layer = item.Attributes.Name or "", _layer_of(model, item)
+        found = patches_of(rhino, item.Geometry)
+        trimmed += [_called(number, found, name, layer) for number, patch in enumerate(found) if patch.trimmed]
+        if isinstance(item.Geometry, rhino.Mesh):
+            parts = [(_points(item.Geometry), _faces(item.Geometry, item.Attributes.GetUserString(_NGONS)))]
+        elif found and surfaces is not None:
+            parts = [sampled(patch, surfaces) for patch in found if not patch.trimmed]
+        else:
+            others[type(item.Geometry).__name__] += 1
+            patches += len(found)
             continue
-        own = _points(mesh) @ place[:3, :3].T + place[:3, 3]
-        found = _faces(mesh, item.Attributes.GetUserString(_NGONS))
         turned = np.linalg.det(place[:3, :3]) < 0.0  # a mirrored block
-        faces += [[v + count for v in (face[::-1] if turned else face)] for face in found]
-        owners += [len(objects)] * len(found)
-        layer = model.Layers[item.Attributes.LayerIndex].FullPath if len(model.Layers) else ""
-        objects.append((item.Attributes.Name or "", layer or ""))
-        points.append(own)
-        count += len(own)
+        for own, rings in parts:
+            points.append(own @ place[:3, :3].T + place[:3, 3])
+            faces += [[v + count for v in (ring[::-1] if turned else ring)] for ring in rings]
+            owners += [len(objects)] * len(rings)
+            count += len(own)
+        objects.append((name, layer))
+    if trimmed and surfaces is not None:
+        raise MeshFileError(path, f"{len(trimmed)} trimmed surface(s), whose boundary no grid of parameters follows: "
+            f"{first_few(trimmed, len(trimmed))}. Hide them, or mesh them in Rhino")  # fmt: skip
     if not points:
-        raise MeshFileError(path, f"has no visible meshes{_listed(others)}. Mesh its surfaces in Rhino first")
+        way = f", or sample them: {_SAMPLE}" if patches else ""
+        raise MeshFileError(path, f"has no visible meshes{_listed(others)}. Mesh its surfaces in Rhino first{way}")
     sizes = np.array([len(face) for face in faces], np.int64)
     corners = np.array([v for face in faces for v in face], np.int64)
     raw = assemble(Origin(path), np.concatenate(points), corners, sizes)
-    parts = RhinoParts(model.Settings.ModelUnitSystem.name, tuple(objects), np.array(owners, np.int64))
-    notes = [f"left out of the file{_listed(others)}"] if others else []
-    return raw._replace(attributes=parts, notes=tuple(notes))
+    attributes = RhinoParts(model.Settings.ModelUnitSystem.name, tuple(objects), np.array(owners, np.int64))
+    way = f". Surfaces are sampled by {_SAMPLE}" if patches else ""
+    notes = [f"left out of the file{_listed(others)}{way}"] if others else []
+    return raw._replace(attributes=attributes, notes=tuple(notes))
 
 
 def write_rhino(mesh: RawMesh, parts: RhinoParts | None = None) -> bytes:
@@ -141,6 +155,18 @@ def _items(rhino: Any, model: Any) -> Iterator[tuple[Any, Floats]]:
     for item in model.Objects:
         if not item.Attributes.IsInstanceDefinitionObject:
             yield from walk(item, np.eye(4), 0)
+
+
+def _layer_of(model: Any, item: Any) -> str:
+    """Path of the layer of an object; empty where it is on none."""
+    number = item.Attributes.LayerIndex
+    return (model.Layers[number].FullPath or "") if 0 <= number < len(model.Layers) else ""
+
+
+def _called(number: int, patches: list[Patch], name: str, layer: str) -> str:
+    """What a surface of an object is called."""
+    face = f"face {number} of " if len(patches) > 1 else ""
+    return f"{face}{name or 'an object without a name'}{f' on layer {layer}' if layer else ''}"
 
 
 def _matrix(transform: Any) -> Floats:
