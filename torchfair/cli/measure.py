@@ -50,7 +50,7 @@ def add_parser(subparsers: Any) -> None:
     parser: argparse.ArgumentParser = subparsers.add_parser(
         "measure", help="print the smoothness of a mesh", description=_DESCRIPTION, allow_abbrev=False
     )
-    add_inputs(parser, "mesh file (OBJ, OFF, PLY, STL, 3DM; GLB, ... through trimesh), or example:roof")
+    add_inputs(parser, "mesh file (OBJ, OFF, PLY, STL, 3DM, DXF; GLB, ... through trimesh), or example:roof")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object instead of tables, a line for each of "
         "several inputs")  # fmt: skip

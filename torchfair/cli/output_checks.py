@@ -12,7 +12,7 @@ from pathlib import Path
 from .errors import CommandError
 from .output_names import owner
 
-MESH_FORMATS = (".obj", ".off", ".ply", ".stl", ".glb", ".3dm")
+MESH_FORMATS = (".obj", ".off", ".ply", ".stl", ".glb", ".3dm", ".dxf")
 
 
 def refuse_unknown_format(path: Path) -> None:

@@ -39,7 +39,7 @@ class PolygonMesh:
         vertex_map: (V of the file,) number of each vertex of the file in this mesh, -1 where it was dropped; None if
             all are there in the order of the file.
         attributes: groups, materials, texture coordinates and the like of an OBJ file, or unit, layers and names of a
-            3DM file, for :func:`save_mesh`; None without.
+            3DM or DXF file, for :func:`save_mesh`; None without.
     """
 
     vertices: Tensor

@@ -40,7 +40,7 @@ class RawMesh(NamedTuple):
     offsets: Ints  # (F+1,)
     names: Names = FROM_ZERO
     notes: tuple[str, ...] = ()  # what was left out, or read in spite of a fault
-    attributes: ObjAttributes | RhinoParts | None = None  # of OBJ and 3DM files
+    attributes: ObjAttributes | RhinoParts | None = None  # of OBJ, 3DM and DXF files
     split: bool = False  # of a format that repeats vertices where faces differ in normals, textures or materials
 
 

@@ -15,6 +15,7 @@ from ..errors import MeshFileError
 from ..repair import coincident_edges, repair_packed, weld_packed
 from ..topology import Topology
 from . import others
+from .dxf import read_dxf
 from .obj import read_obj
 from .off import read_off
 from .ply import read_ply
@@ -30,6 +31,7 @@ _READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {
     ".ply": read_ply,
     ".stl": read_stl,
     ".3dm": read_rhino,
+    ".dxf": read_dxf,
 }
 _SPLIT = "files of this format repeat vertices where normals, textures or materials differ: "
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"PK\x03\x04": "zip", b"BZh": "bzip2", b"\xfd7zXZ\0": "xz"}
@@ -47,7 +49,8 @@ def load_mesh(
 
     The format follows from the extension, upper or lower case. OBJ, OFF and PLY (text and binary) keep polygons, vertex
     order and orientation exactly. Corners of STL files at the same position become one vertex where an edge joins them.
-    3DM files hold their visible meshes in one (with the package rhino3dm). GLB, GLTF, DAE and 3MF go through trimesh
+    3DM files hold their visible meshes in one (with the package rhino3dm), DXF files their MESH entities and polyface
+    meshes. GLB, GLTF, DAE and 3MF go through trimesh
     with ``process=False``, and are welded as by ``weld=True``, with a note: such files repeat vertices where normals,
     textures or materials differ. Vertices that no face uses are legal. Edges of the boundary that lie on each other are
     told in ``PolygonMesh.notes``, and so is a mesh most of whose edges are boundary.

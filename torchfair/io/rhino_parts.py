@@ -1,4 +1,4 @@
-"""Which faces of a 3DM file are of which object, as it is written back."""
+"""Which faces of a 3DM or DXF file are of which object, as it is written back."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ UNITLESS = "None"
 
 @dataclass(frozen=True, eq=False)
 class RhinoParts:
-    """Objects of a 3DM file.
+    """Objects of a 3DM or DXF file.
 
     Attributes:
         unit: Unit of length, by its name in Rhino, such as Millimeters.
-        objects: Name and layer (Roof::Glass) of each object.
+        objects: Name (empty in DXF files) and layer (Roof::Glass) of each object.
         owners: (F,) object of each face.
     """
 
@@ -35,7 +35,9 @@ class RhinoParts:
 
     def left_out(self, suffix: str, same_faces: bool, marks: bool = False) -> str:
         """What a mesh file with that extension will not hold, in words; see ``ObjAttributes``."""
-        if suffix != ".3dm":
+        if suffix == ".dxf" and any(name for name, _ in self.objects):
+            return "the names of objects"
+        if suffix not in (".3dm", ".dxf"):
             named = any(name or layer for name, layer in self.objects)
             return f"the unit ({self.unit})" + (" and names and layers of objects" if named else "")
         return "" if same_faces or len(self.objects) == 1 else "the single objects"

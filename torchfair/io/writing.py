@@ -15,6 +15,7 @@ from .._half_edges import first_few
 from ..errors import MeshError, MeshFileError, ShapeError
 from ..topology import Topology
 from . import others
+from .dxf import write_dxf
 from .obj import write_obj
 from .obj_attributes import ObjAttributes
 from .off import write_off
@@ -44,8 +45,9 @@ def save_mesh(
 
     The format follows from the extension. OBJ, OFF and PLY keep polygons, vertex order and orientation; their
     text holds the shortest digits that read back to the same float64. 3DM files (with the package rhino3dm) are in
-    double precision, too; polygons of more than four corners are triangles there, which are read back as polygons. STL
-    and GLB hold triangles only, in single precision.
+    double precision, too; polygons of more than four corners are triangles there, which are read back as polygons. DXF
+    files hold MESH entities, one for each object of ``attributes``, every digit and polygon. STL and GLB hold triangles
+    only, in single precision.
 
     Args:
         path: the file; its folder must exist.
@@ -57,8 +59,8 @@ def save_mesh(
         polylines: OBJ files only: vertex numbers, two or more each, that are written as line elements, such as from
             ``PrincipalEdges.polylines``; :func:`load_edge_labels` reads the edges back.
         attributes: groups, materials, texture coordinates and colours of an OBJ file, or unit, layers and names of a
-            3DM file, as they were read (:attr:`PolygonMesh.attributes`), which are written back; the mesh must have the
-            same faces.
+            3DM file (unit and layers of a DXF file), as they were read (:attr:`PolygonMesh.attributes`), which are
+            written back; the mesh must have the same faces.
         colors: PLY files only: (V, 3) red, green and blue of every vertex, 0 to 1.
 
     Raises:
@@ -69,7 +71,7 @@ def save_mesh(
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    known = (".obj", ".off", ".ply", ".3dm", *others.WRITTEN)
+    known = (".obj", ".off", ".ply", ".3dm", ".dxf", *others.WRITTEN)
     if suffix not in known:
         raise MeshFileError(path, f"cannot write the format {suffix or '(none)'}. Known are {', '.join(known)}")
     if binary and suffix != ".ply":
@@ -88,6 +90,8 @@ def save_mesh(
         data = write_obj(mesh, lines, attributes if isinstance(attributes, ObjAttributes) else None, path.parent)
     elif suffix == ".3dm":
         data = write_rhino(mesh, attributes if isinstance(attributes, RhinoParts) else None)
+    elif suffix == ".dxf":
+        data = write_dxf(mesh, attributes if isinstance(attributes, RhinoParts) else None)
     elif suffix == ".off":
         data = write_off(mesh)
     elif suffix == ".ply":
@@ -113,7 +117,7 @@ def _raw_mesh(vertices: Tensor, topology: Topology) -> RawMesh:
     return RawMesh(points, topology.corners.cpu().numpy(), topology.face_offsets.cpu().numpy())
 
 
-_ATTRIBUTES: dict[str, type] = {".obj": ObjAttributes, ".3dm": RhinoParts}
+_ATTRIBUTES: dict[str, type] = {".obj": ObjAttributes, ".3dm": RhinoParts, ".dxf": RhinoParts}
 
 
 def _check_fit(mesh: RawMesh, attributes: ObjAttributes | RhinoParts) -> None:

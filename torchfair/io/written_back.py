@@ -6,7 +6,7 @@ from .obj_attributes import ObjAttributes
 from .rhino_parts import RhinoParts
 
 Attributes = ObjAttributes | RhinoParts
-_OF = {".obj": ObjAttributes, ".3dm": RhinoParts}
+_OF = {".obj": ObjAttributes, ".3dm": RhinoParts, ".dxf": RhinoParts}
 
 
 def written_back(attributes: Attributes | None, suffix: str, *, same_faces: bool, count: int) -> Attributes | None:
