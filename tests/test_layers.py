@@ -13,7 +13,8 @@ FLOORS = (
     {"errors", "_interrupts", "_loading", "_precision", "_short_repr", "_shown", "_solver_names", "_tables"}
     | {"_threads"},
     {"_names", "_numbers", "_ranges", "_staged", "_tracing", "cameras", "linear", "progress", "rasterisation"},
-    {"_atomic", "_half_edges", "_mesh_sums", "_packed_tensors", "settings"},
+    {"_atomic", "_face_hints", "_mesh_sums", "_packed_tensors", "settings"},
+    {"_half_edges"},
     {"_connectivity", "projection"},
     {"_topology_tables"},
     {"_joined_topology"},

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 import torch
 
+from . import _face_hints
 from ._names import Ints as Ints
 from ._names import PlacedError, few, few_groups
 from ._names import first_few as first_few
@@ -170,7 +171,7 @@ def check_faces(corners: Ints, offsets: Ints, num_vertices: int | None) -> int:
         raise PlacedError(
             f"{small.size} face(s) have fewer than three corners: faces ",
             few("face", small),
-            ". Remove them from the face list.",
+            f". Remove them from the face list.{_face_hints.of_sizes(offsets)}",
         )
     return _count_vertices(corners, offsets, num_vertices)
 
@@ -188,7 +189,8 @@ def _count_vertices(corners: Ints, offsets: Ints, num_vertices: int | None) -> i
         raise PlacedError(
             f"vertex numbers out of range 0 <= number < {num_vertices}: ",
             few_groups(named, outside.size),
-            ". Count vertices from zero and pass num_vertices if the last vertices are unused.",
+            ". Count vertices from zero and pass num_vertices if the last vertices are unused."
+            + _face_hints.of_numbers(corners[outside]),
         )
     return num_vertices
 
@@ -208,5 +210,6 @@ def _check_repeats(half: HalfEdges) -> None:
         raise PlacedError(
             f"{repeated.size} face(s) use a vertex more than once: faces ",
             few("face", repeated),
-            ". Remove the repeated corner, or the face if fewer than three corners remain.",
+            ". Remove the repeated corner, or the face if fewer than three corners remain."
+            + _face_hints.of_repeats(corners, face_ids, repeated),
         )
