@@ -240,3 +240,22 @@ def test_the_choice_follows_size_device_and_what_is_installed(
     monkeypatch.setattr(RslabDirect, "available", staticmethod(lambda: rslab))
     pattern = SimpleNamespace(num_unknowns=size, device=torch.device(device))
     assert choose_solver("auto", pattern).name == name
+
+
+def test_descending_stops_where_the_quadratic_hardly_falls_any_more() -> None:
+    """On a stiff chain most of the fall comes first; a remainder as small as asked for takes many more iterations."""
+    size = 400
+    matrix = sp.diags([[-1.0] * (size - 1), [2.0] * size, [-1.0] * (size - 1)], [-1, 0, 1]).tocsr()
+    scale = sp.diags(np.geomspace(1.0, 1e3, size))
+    factor = factorise(scale @ matrix @ scale, torch.full((size,), 1e-2, dtype=torch.float64), solver="cg")
+    assert isinstance(factor, Descending)
+    right = torch.from_numpy(np.random.default_rng(3).standard_normal((size, 2)))
+    rough, whole, exact = factor.descend(right, 0.01), factor.solve(right, 0.01), factor.solve(right, 1e-10)
+    assert rough.iterations < 0.5 * whole.iterations
+    torch.testing.assert_close(rough.remainder.norm(dim=0) > 0.01 * right.norm(dim=0), torch.ones(2, dtype=torch.bool))
+
+    def falls(solution: Solution) -> torch.Tensor:
+        return 0.5 * (solution.values * (right + solution.remainder)).sum(0)
+
+    assert bool((falls(rough) > 0.8 * falls(exact)).all())
+    assert factor.descend(right, 1e-10).remainder.norm() <= 2e-9 * right.norm()

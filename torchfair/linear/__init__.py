@@ -1,5 +1,6 @@
 """Linear solvers for symmetric positive definite matrices, behind one small protocol; they know no mesh."""
 
+from .base import Descending as Descending
 from .base import Factor as Factor
 from .base import LinearSolver as LinearSolver
 from .base import Pattern as Pattern

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor
@@ -83,6 +83,18 @@ class Factor(Protocol):
         Raises:
             SingularSystemError: the matrix is singular, indefinite or not finite.
         """
+        ...
+
+
+@runtime_checkable
+class Descending(Protocol):
+    """A factor that knows how far a solution lowers the quadratic ``x^T (A + diag(damping)) x / 2 - b^T x``.
+
+    For a damped step that is what counts: a solution with a large remainder may lower it nearly as far as the exact one.
+    """
+
+    def descend(self, right: Tensor, accuracy: float) -> Solution:
+        """As :meth:`Factor.solve`, to an end also where the quadratic hardly falls any more."""
         ...
 
 

@@ -11,7 +11,7 @@ from torch import Tensor
 from ..linear import LinearSolver
 from .linear_system import LinearSystem
 from .loss import is_one_sided
-from .proposal import Proposal
+from .proposal import Proposal, descend
 from .system import Structure
 
 _MOST_SOLVES = 6
@@ -88,7 +88,7 @@ class Inequalities:
         for _ in range(_MOST_SOLVES):
             system = self.heeding(heeded)
             factor = solver.factorise(system, damping)
-            solution = factor.solve(-system.gradient, accuracy)
+            solution = descend(factor, -system.gradient, accuracy)
             iterations += solution.iterations
             change = (solution.values * structure.free - at.change) * structure.layout.member_spread(going)
             at, length = at.lowest_along(change, *self._split(*self._whole.changes(change)))

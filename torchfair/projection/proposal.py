@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-from ..linear import Factor, LinearSolver
+from ..linear import Descending, Factor, LinearSolver, Solution
 from .linear_system import LinearSystem
 from .system import Evaluation
 
@@ -38,7 +38,7 @@ class Proposal:
     def of(cls, system: LinearSystem, solver: LinearSolver, damping: Tensor, accuracy: float) -> Proposal:
         """From the solution of one damped system."""
         structure, factor = system.structure, solver.factorise(system, damping)
-        solution = factor.solve(-system.gradient, accuracy)
+        solution = descend(factor, -system.gradient, accuracy)
         change = solution.values * structure.free
         fall = 0.5 * structure.layout.member_sums(change * (damping * change - system.gradient + solution.remainder))
         return cls(change, fall, solution.iterations, system, factor, damping)
@@ -56,5 +56,10 @@ class Proposal:
             accuracy: Relative remainder of the linear solution that is good enough.
         """
         right = -(self.system.gradient_with(trial) + self.damping * step)
-        correction: Tensor = self.factor.solve(right, accuracy).values * self.system.structure.free
+        correction: Tensor = descend(self.factor, right, accuracy).values * self.system.structure.free
         return correction
+
+
+def descend(factor: Factor, right: Tensor, accuracy: float) -> Solution:
+    """A solution good enough for a step: iterative solvers stop where the model hardly falls any more."""
+    return (factor.descend if isinstance(factor, Descending) else factor.solve)(right, accuracy)
