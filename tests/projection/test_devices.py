@@ -64,7 +64,7 @@ def test_a_step_waits_for_the_device_a_few_times_whatever_its_linear_iterations(
             *handle_terms(torch.arange(81, device=PRETENDED), places, weight=10.0),
         ]
         made = GuidedProjection({"vertices": there}, terms, solver="cg")
-        state = init(made, {"vertices": there})
+        state = init(made, {"vertices": there}, ProjectionSettings(solver="cg", accuracy=1e-5))
         state, _ = step(made, state)  # makes the index maps
         for _ in range(3):
             pretended.waits.clear()

@@ -90,7 +90,8 @@ class Factor(Protocol):
 class Descending(Protocol):
     """A factor that knows how far a solution lowers the quadratic ``x^T (A + diag(damping)) x / 2 - b^T x``.
 
-    For a damped step that is what counts: a solution with a large remainder may lower it nearly as far as the exact one.
+    For a damped step that is what counts: a solution with a large remainder may lower it nearly as far as the exact
+    one.
     """
 
     def descend(self, right: Tensor, accuracy: float) -> Solution:

@@ -14,6 +14,7 @@ from torch import Tensor
 from ..linear.sparse import csr_matrix
 from .compiled import CompiledTerm
 from .layout import Layout, State
+from .portions import portions
 
 _TOLERANCE = 1e-3
 
@@ -32,48 +33,77 @@ class AffinePart:
     Attributes:
         offset: (rows,) b.
         jacobian: ``A`` with zero columns at fixed unknowns, a SciPy CSR matrix.
-        normal_matrix: ``A^T A``, zero at fixed unknowns, likewise.
     """
 
     def __init__(self, terms: Sequence[CompiledTerm], layout: Layout, free: Tensor, dtype: torch.dtype) -> None:
         origin = layout.unflatten(torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device))
         self._terms = [compiled.term for compiled in terms]
-        matrices, offsets, roots = [], [], []
+        matrices, offsets, roots, sizes = [], [], [], []
         for compiled in terms:
-            values, jacobians = compiled.term.linearised(compiled.term.arguments(origin))
-            root = compiled.term.roots(values)
-            n, m, k = jacobians.shape
-            entries = (jacobians * root[:, None, None]).cpu().numpy()
-            columns = np.repeat(compiled.unknowns.T.cpu().numpy()[:, None], m, axis=1)
-            rows = np.repeat(np.arange(n * m), k)
-            matrices.append(sp.csr_matrix((entries.ravel(), (rows, columns.ravel())), (n * m, layout.num_unknowns)))
-            offsets.append((values * root[:, None]).reshape(-1))
+            arguments = compiled.term.arguments_at(origin)
+            root = compiled.term.roots(compiled.term.values(arguments))
+            unknowns = compiled.unknowns
+            for elements in portions(root.shape[0], root):
+                values, jacobians = compiled.term.linearised(arguments.part(elements))
+                matrices.append(_rows(jacobians * root[elements, None, None], unknowns[:, elements], layout))
+                offsets.append((values * root[elements, None]).reshape(-1))
+            m = values.shape[1]
+            sizes.append(root.shape[0] * m)
             roots.append(root.repeat_interleave(m))
-        whole = sp.csr_matrix(sp.vstack(matrices))
-        whole.eliminate_zeros()
+        whole = matrices[0] if len(matrices) == 1 else sp.csr_matrix(sp.vstack(matrices, format="csr"))
         self.offset, self._roots = torch.cat(offsets), torch.cat(roots)
-        self._sizes = [offset.shape[0] for offset in offsets]
+        self._sizes: list[int] = sizes
         self._matrix, self._whole = whole, self._to_torch(whole)
-        self._products = sp.csr_matrix(whole.T @ whole)
         self._mask(free)
 
     def with_free(self, free: Tensor) -> AffinePart:
         """The same terms with other unknowns (N,) that may move."""
         result = copy.copy(self)
-        result.__dict__.pop("diagonal", None)
+        for stale in ("diagonal", "normal_matrix"):
+            result.__dict__.pop(stale, None)
         result._mask(free)
         return result
 
     def _mask(self, free: Tensor) -> None:
         """Makes columns of fixed unknowns zero; their places stay, so that they can be freed again."""
-        self.jacobian, self.normal_matrix = self._matrix, self._products
+        self.jacobian, self._free = self._matrix, None
         if not bool(free.all()):
-            moves = free.cpu().numpy()
-            self.jacobian, self.normal_matrix = self._matrix.copy(), self._products.copy()
-            self.jacobian.data *= moves[self._matrix.indices]
-            rows = np.repeat(np.arange(moves.size), np.diff(self._products.indptr))
-            self.normal_matrix.data *= moves[rows] & moves[self._products.indices]
+            self._free = free
+            self.jacobian = self._matrix.copy()
+            self.jacobian.data *= free.cpu().numpy()[self._matrix.indices]
         self._transpose = self._to_torch(sp.csr_matrix(self.jacobian.T))
+
+    @cached_property
+    def _products(self) -> sp.csr_matrix:
+        return sp.csr_matrix(self._matrix.T @ self._matrix)
+
+    @cached_property
+    def normal_matrix(self) -> sp.csr_matrix:
+        """``A^T A``, zero at fixed unknowns, a SciPy CSR matrix; made when it is first asked for."""
+        products = self._products
+        if self._free is None:
+            return products
+        moves, products = self._free.cpu().numpy(), products.copy()
+        rows = np.repeat(np.arange(moves.size), np.diff(products.indptr))
+        products.data *= moves[rows] & moves[products.indices]
+        return products
+
+    def product(self, vectors: Tensor) -> Tensor:
+        """``A^T A`` times vectors (N,) or (N, k)."""
+        if self._free is not None:
+            vectors = vectors * (self._free if vectors.ndim == 1 else self._free[:, None])
+        result: Tensor = self._transpose @ (self._whole @ vectors)
+        return result
+
+    def diagonal_blocks(self, first: int, nodes: int, width: int) -> Tensor:
+        """(nodes, width, width) diagonal blocks of ``A^T A``, of nodes whose unknowns lie one after the other."""
+        columns = [self.jacobian[:, first + a : first + nodes * width : width] for a in range(width)]
+        blocks = self.offset.new_empty(nodes, width, width)
+        for a, one in enumerate(columns):
+            for b, other in enumerate(columns[: a + 1]):
+                sums = np.asarray(one.multiply(other).sum(axis=0)).reshape(-1)
+                blocks[:, a, b] = blocks[:, b, a] = torch.from_numpy(sums).to(blocks)
+        return blocks
 
     def _to_torch(self, matrix: sp.csr_matrix) -> Tensor:
         offsets, columns = torch.from_numpy(matrix.indptr), torch.from_numpy(matrix.indices)
@@ -115,7 +145,7 @@ class AffinePart:
         sizes = abs(self._matrix) @ flat.abs().cpu().numpy() + self.offset.abs().cpu().numpy()
         scales = torch.split(torch.from_numpy(sizes), self._sizes)
         for term, mine, scale in zip(self._terms, torch.split(self.residual(flat), self._sizes), scales, strict=True):
-            values = term.values(term.arguments(state))
+            values = term.values(term.arguments_at(state))
             own = (values * term.roots(values)[:, None]).reshape(-1)
             if own.numel() and not float((own - mine).abs().max()) <= _TOLERANCE * float(scale.max()):
                 return term.name
@@ -129,5 +159,16 @@ class AffinePart:
     @cached_property
     def diagonal(self) -> Tensor:
         """(N,) of ``A^T A``."""
-        squares = self.jacobian.multiply(self.jacobian).sum(axis=0)
-        return torch.from_numpy(np.asarray(squares).reshape(-1)).to(self.offset)
+        squares = np.bincount(self.jacobian.indices, self.jacobian.data**2, self.jacobian.shape[1])
+        return torch.from_numpy(squares).to(self.offset)
+
+
+def _rows(jacobians: Tensor, unknowns: Tensor, layout: Layout) -> sp.csr_matrix:
+    """Rows for the Jacobians (n, m, K) of elements with unknowns (K, n), without zeros."""
+    n, m, k = jacobians.shape
+    columns = unknowns.T.to(torch.int32)[:, None].expand(n, m, k).reshape(-1).cpu().numpy()
+    offsets = np.arange(n * m + 1, dtype=np.int32) * k
+    matrix = sp.csr_matrix((jacobians.reshape(-1).cpu().numpy(), columns, offsets), (n * m, layout.num_unknowns))
+    matrix.sum_duplicates()
+    matrix.eliminate_zeros()
+    return matrix

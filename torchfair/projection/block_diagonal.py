@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import torch
 from torch import Tensor
 
 from ..linear.sparse import csr_matrix
 from .affine import AffinePart
-from .compiled import CompiledTerm
 from .layout import Layout
-from .products import ProductSum
+from .node_sums import NodeSums
 
 
 class BlockDiagonal:
@@ -20,56 +17,49 @@ class BlockDiagonal:
     This is also the order of the values of that matrix in compressed rows.
     """
 
-    def __init__(self, layout: Layout, terms: Sequence[CompiledTerm], affine: AffinePart | None, like: Tensor) -> None:
-        self._layout, self._like = layout, like
-        starts, mirror, columns, lengths, size = [], [], [], [], 0
+    def __init__(self, layout: Layout, sums: NodeSums, affine: AffinePart | None, like: Tensor) -> None:
+        self._layout, self._sums, self._affine, self._like = layout, sums, affine, like
+        columns, lengths, self._starts, size = [], [], {}, 0
         for name, (n, d) in layout.sizes.items():
-            node, component = torch.arange(n)[:, None, None], torch.arange(d)
-            a, b = component[:, None], component[None, :]
-            starts.append(size + torch.arange(n) * d * d)
-            mirror.append((size + node * d * d + torch.maximum(a, b) * d + torch.minimum(a, b)).flatten())
-            columns.append((layout.offset(name) + node * d + b.expand(d, d)).flatten())
-            lengths.append(torch.full((n * d,), d))
+            component, width = torch.arange(d, dtype=torch.int32), torch.tensor(d, dtype=torch.int32)
+            node = layout.offset(name) + torch.arange(n, dtype=torch.int32)[:, None, None] * width
+            columns.append((node + component.expand(d, d)).flatten())
+            lengths.append(width.expand(n * d))
+            self._starts[layout.offset(name)] = size, n, d
             size += n * d * d
-        offsets = torch.cat([torch.zeros(1, dtype=torch.int64), torch.cat(lengths).cumsum(0)])
-        self._rows = torch.repeat_interleave(torch.cat(lengths))
-        self._starts = torch.cat(starts)
-        self._mirror, self._columns, self._offsets = (
-            index.to(like.device, torch.int32) for index in (torch.cat(mirror), torch.cat(columns), offsets)
-        )
-        self._products = None
-        if terms:
-            firsts = [[p - a for p, a in enumerate(_components(term))] for term in terms]
-            places = [self._places(term) for term in terms]
-            self._products = ProductSum(firsts, places, [None] * len(terms), size, like)
-        self._constant = None if affine is None else self._pick(affine).to(like)
+        self._size = size
+        self._known: dict[int, Tensor] = {}
+        offsets = torch.cat([torch.zeros(1, dtype=torch.int32), torch.cat(lengths).cumsum(0, dtype=torch.int32)])
+        self._columns, self._offsets = torch.cat(columns).to(like.device), offsets.to(like.device)
 
-    def _places(self, term: CompiledTerm) -> Tensor:
-        """Places of the products of two unknowns of one stencil row, lower triangles."""
-        nodes = term.nodes.cpu()
-        rows = [
-            self._starts[nodes[row]] + (a * width + b)
-            for row, width in enumerate(term.widths)
-            for a in range(width)
-            for b in range(a + 1)
-        ]
-        return torch.stack(rows)
-
-    def _pick(self, affine: AffinePart) -> Tensor:
-        """The blocks of the constant normal matrix."""
-        rows, columns = self._rows.numpy().copy(), self._columns.cpu().numpy().copy()
-        return torch.from_numpy(affine.normal_matrix[rows, columns]).reshape(-1)
-
-    def values(self, jacobians: Sequence[Tensor]) -> Tensor:
+    def values(self, jacobians: list[Tensor]) -> Tensor:
         """Blocks of ``J^T J`` for element Jacobians ``(m, K, n)``, flat.
 
         Where an element names a node twice, the mixed products are left out.
         """
-        if self._products is None:
-            values = self._like.new_zeros(self._mirror.shape[0])
-        else:
-            values = self._products(jacobians).index_select(0, self._mirror)
-        return values if self._constant is None else values.add_(self._constant)
+        values = self._like.new_zeros(self._size)
+        for first, a, b, entries in self._sums.blocks(jacobians):
+            here = self._block(values, first)
+            here[:, a, b] = entries
+        if self._affine is not None:
+            for first, (_, n, d) in self._starts.items():
+                self._block(values, first).add_(self._constant(first, n, d))
+        for first, (_, _, d) in self._starts.items():
+            here = self._block(values, first)
+            for a in range(d):
+                for b in range(a):
+                    here[:, b, a] = here[:, a, b]
+        return values
+
+    def _constant(self, first: int, n: int, d: int) -> Tensor:
+        """The blocks of linear terms, found once."""
+        if first not in self._known and self._affine is not None:
+            self._known[first] = self._affine.diagonal_blocks(first, n, d)
+        return self._known[first]
+
+    def _block(self, values: Tensor, first: int) -> Tensor:
+        start, n, d = self._starts[first]
+        return values[start : start + n * d * d].view(n, d, d)
 
     def split(self, values: Tensor) -> dict[str, Tensor]:
         """Flat blocks as ``(n, d, d)`` by block of variables (views)."""
@@ -81,7 +71,3 @@ class BlockDiagonal:
         """Flat blocks as a CSR matrix."""
         size = self._layout.num_unknowns
         return csr_matrix(self._offsets, self._columns, values, (size, size))
-
-
-def _components(term: CompiledTerm) -> list[int]:
-    return [component for width in term.widths for component in range(width)]

@@ -11,6 +11,7 @@ from ..errors import ShapeError
 from .declarations import check_declarations
 from .differentiation import Way
 from .layout import Layout
+from .portions import Arguments
 from .term import ElementTerm, Residual
 
 
@@ -18,8 +19,6 @@ class CompiledTerm:
     """A term with its unknowns numbered in the flat vector.
 
     Attributes:
-        unknowns: (K, n) flat number of each unknown of each element.
-        nodes: (k, n) node number of each row of the stencil, all blocks together.
         widths: number of unknowns of each of the k rows.
         verified: functions of a term on this stencil that were found to be what it declares, see :meth:`verify`.
     """
@@ -27,18 +26,27 @@ class CompiledTerm:
     def __init__(self, term: ElementTerm, layout: Layout) -> None:
         self.term = term
         self.verified: tuple[Residual, Residual | None, bool, Way | None] | None = None
-        unknowns, nodes, self.widths = [], [], []
+        self._layout = layout
+        self.widths: list[int] = []
         for name, index in term.stencil:
-            width = layout.sizes[name][1]
-            components = torch.arange(width, device=index.device)
-            flat = layout.offset(name) + index[:, :, None] * width + components
-            unknowns.append(flat.flatten(1))
-            nodes.append(layout.node_offset(name) + index)
-            self.widths += [width] * index.shape[1]
-        self.unknowns = torch.cat(unknowns, dim=1).T.contiguous()
-        self.nodes = torch.cat(nodes, dim=1).T.contiguous()
+            self.widths += [layout.sizes[name][1]] * index.shape[1]
 
-    def verify(self, arguments: tuple[Tensor, ...]) -> None:
+    @property
+    def unknowns(self) -> Tensor:
+        """(K, n) flat number of each unknown of each element; made anew whenever it is asked for."""
+        rows = []
+        for name, index in self.term.stencil:
+            width = self._layout.sizes[name][1]
+            components = self._layout.offset(name) + torch.arange(width, device=index.device)
+            rows.append((index.T[:, None] * width + components[:, None]).flatten(0, 1))
+        return torch.cat(rows)
+
+    @property
+    def nodes(self) -> Tensor:
+        """(k, n) node number of each row of the stencil, all blocks together; likewise."""
+        return torch.cat([self._layout.node_offset(name) + index.T for name, index in self.term.stencil])
+
+    def verify(self, arguments: Arguments) -> None:
         """Tries at a few elements what the term declares; once, also for later data, weights and losses."""
         functions = (self.term.residual, self.term.jacobian, self.term.batched, self.term.derivatives)
         if self.verified != functions:

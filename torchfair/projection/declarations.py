@@ -8,6 +8,7 @@ from torch import Tensor
 from ..errors import TorchfairError
 from .differentiation import as_rows, differentiate
 from .element_function import checked
+from .portions import Arguments
 from .term import ElementTerm
 
 _ELEMENTS = 8
@@ -15,7 +16,7 @@ _TOLERANCE = {torch.float64: 1e-3, torch.float32: 5e-2}  # of the largest deriva
 _MOVED = 1e-2  # of the size of an element
 
 
-def check_declarations(term: ElementTerm, arguments: tuple[Tensor, ...]) -> None:
+def check_declarations(term: ElementTerm, arguments: Arguments) -> None:
     """Raises TorchfairError unless a closed form is the derivative and rows of a batched term stand for themselves.
 
     Likewise where the residual does not depend on the unknowns, for which ``torch.func`` gives zeros without a word.
@@ -30,9 +31,9 @@ def check_declarations(term: ElementTerm, arguments: tuple[Tensor, ...]) -> None
     transformed = term.derivatives in ("jacrev", "jacfwd")
     if not term.batched and not term.has_closed_form and not transformed:
         return
-    count = arguments[0].shape[0]
-    chosen = torch.linspace(0, count - 1, min(count, _ELEMENTS), device=arguments[0].device).round().long()
-    few = tuple(argument[chosen] for argument in arguments)
+    count, device = term.num_elements, term.stencil[0][1].device
+    chosen = torch.linspace(0, count - 1, min(count, _ELEMENTS), device=device).round().long()
+    few = arguments.part(chosen)
     if term.batched:
         _check_rows(term, _moved(term, few))
     if transformed:

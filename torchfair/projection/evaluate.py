@@ -44,7 +44,7 @@ def residual_tables(structure: Structure, terms: Sequence[ElementTerm], at: Eval
             if id(term) in known:
                 arguments, values = known[id(term)]
             else:
-                arguments = term.arguments(at.state)
+                arguments = term.arguments_at(at.state)
                 values = term.values(arguments)
             norms.append(torch.linalg.vector_norm(term.missed(values), dim=1).double().cpu().view(count, -1))
             share += term.contributions(arguments, values).double().cpu().view(count, -1).sum(1)
@@ -69,7 +69,7 @@ def check_start(structure: Structure, start: Evaluation) -> None:
     if bool(torch.isfinite(start.merits).all()):
         for term in structure.terms:
             if term.linear:
-                check_declarations(term, term.arguments(state))
+                check_declarations(term, term.arguments_at(state))
         affine = structure.affine
         misfit = affine.misfit(state, structure.layout.flatten(state)) if affine is not None else None
         if misfit is not None:
@@ -80,7 +80,7 @@ def check_start(structure: Structure, start: Evaluation) -> None:
                 check_merit(compiled.term, arguments, values)
         return
     for term in structure.terms:
-        arguments = term.arguments(state)
+        arguments = term.arguments_at(state)
         values = term.values(arguments)
         check_finite(term, arguments, values)
         check_merit(term, arguments, values)

@@ -71,7 +71,7 @@ class LinearSystem:
         return self._pulled_back(residuals, other.affine)
 
     def _pulled_back(self, residuals: Sequence[Tensor], affine: Tensor | None) -> Tensor:
-        total = self.structure.scatter([_contract(j, r) for j, r in zip(self.jacobians, residuals, strict=True)])
+        total = self.structure.scatter(self.jacobians, residuals)
         if self.structure.affine is not None and affine is not None:
             total += self.structure.affine.gradient(affine)
         return total
@@ -102,7 +102,7 @@ class LinearSystem:
         Used for scaling only: where an element names a node twice, the mixed products are left out, here
         and in :attr:`diagonal_blocks`.
         """
-        total = self.structure.scatter([_contract(j, j) for j in self.jacobians])
+        total = self.structure.scatter(self.jacobians, self.jacobians)
         return total if self.structure.affine is None else total + self.structure.affine.diagonal
 
     @cached_property
@@ -114,6 +114,12 @@ class LinearSystem:
     @cached_property
     def _matrices(self) -> tuple[Tensor, Tensor]:
         return self.structure.row_pattern(tuple(j.shape[0] for j in self.jacobians)).matrices(self.jacobians)
+
+    @cached_property
+    def _term_matrices(self) -> tuple[Tensor, Tensor]:
+        """The Jacobian of the terms that are not linear and its transpose."""
+        outputs = tuple(j.shape[0] for j in self.jacobians)
+        return self.structure.row_pattern(outputs, whole=False).matrices(self.jacobians)
 
     @property
     def jacobian(self) -> Tensor:
@@ -143,8 +149,9 @@ class LinearSystem:
 
     def product(self, vectors: Tensor) -> Tensor:
         """``J^T J`` times vectors (N,) or (N, k)."""
-        result: Tensor = self.jacobian_transpose @ (self.jacobian @ vectors)
-        return result
+        rows, turned = self._term_matrices
+        result: Tensor = turned @ (rows @ vectors)
+        return result if self.structure.affine is None else result.add_(self.structure.affine.product(vectors))
 
     def preconditioner(self, damping: Tensor) -> Tensor:
         """Inverse of the damped diagonal blocks, as a CSR matrix."""
@@ -158,11 +165,3 @@ class LinearSystem:
     def lower_values(self) -> Tensor:
         """Values of the lower triangle of ``J^T J`` in the order of the normal pattern."""
         return self.structure.normal_pattern.assemble(self.jacobians)
-
-
-def _contract(jacobian: Tensor, other: Tensor) -> Tensor:
-    """(K, n) sum over components of ``jacobian`` (m, K, n) times ``other`` (m, n) or (m, K, n)."""
-    total = jacobian[0] * other[0]
-    for row, factor in zip(jacobian[1:], other[1:], strict=True):
-        total.addcmul_(row, factor)
-    return total

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .portions import Arguments
 from .system import Evaluation, Structure
 
 
@@ -30,9 +31,13 @@ def with_members(
         result.view(members, size, *old.shape[1:])[places] = new.view(-1, size, *old.shape[1:])[sources]
         return result
 
-    arguments = [tuple(map(mixed, *pair)) for pair in zip(at.arguments, part.arguments, strict=True)]
+    state = structure.layout.unflatten(flat)
+    arguments = [
+        Arguments(old.term, state, tuple(map(mixed, old.data, new.data)))
+        for old, new in zip(at.arguments, part.arguments, strict=True)
+    ]
     values = [mixed(*pair) for pair in zip(at.values, part.values, strict=True)]
     affine = None
     if structure.affine is not None and at.affine is not None and part.affine is not None:
         affine = structure.affine.with_members(at.affine, part.affine, places, members)
-    return Evaluation(structure.layout.unflatten(flat), mixed(at.merits, part.merits), arguments, values, affine)
+    return Evaluation(state, mixed(at.merits, part.merits), arguments, values, affine)

@@ -25,22 +25,26 @@ class RowPattern:
     def __init__(
         self, terms: Sequence[CompiledTerm], outputs: Sequence[int], affine: AffinePart | None, like: Tensor
     ) -> None:
-        lengths, columns = [like.new_zeros(1, dtype=torch.int64)], [like.new_zeros(0, dtype=torch.int64)]
+        lengths, columns = [like.new_zeros(1, dtype=torch.int64)], [like.new_zeros(0, dtype=torch.int32)]
         for term, m in zip(terms, outputs, strict=True):
             k, n = term.unknowns.shape
             lengths.append(torch.full((m * n,), k, device=like.device))
-            columns.append(term.unknowns.T.expand(m, -1, -1).reshape(-1))
+            columns.append(term.unknowns.to(torch.int32).T.expand(m, -1, -1).reshape(-1))
         self._constant = like.new_zeros(0)
         if affine is not None:
             lengths.append(torch.from_numpy(affine.jacobian.indptr).diff().to(like.device))
             columns.append(torch.from_numpy(affine.jacobian.indices).to(like.device))
             self._constant = torch.from_numpy(affine.jacobian.data).to(like)
         self._columns = torch.cat(columns).to(torch.int32)
-        self._offsets = torch.cat(lengths).cumsum(0).to(torch.int32)
+        del columns
+        self._offsets = torch.cat(lengths).cumsum(0, dtype=torch.int32)
+        del lengths
         self._shape = (self._offsets.shape[0] - 1, like.shape[0])
         self._transposed_offsets, self._order = group(self._columns, like.shape[0])
-        rows = torch.repeat_interleave(self._offsets.diff())
-        self._transposed_columns = rows[self._order].to(torch.int32)
+        rows = torch.repeat_interleave(
+            torch.arange(self._shape[0], device=like.device, dtype=torch.int32), self._offsets.diff()
+        )
+        self._transposed_columns = rows.index_select(0, self._order)
 
     def matrices(self, jacobians: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
         """``J`` and its transpose in CSR form for element Jacobians ``(m, K, n)``."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
@@ -21,7 +23,7 @@ def first_bad_elements(term: ElementTerm, state: State) -> list[int]:
     return rows(~torch.isfinite(torch.cat([values[:, :, None], jacobians], dim=2)))
 
 
-def check_finite(term: ElementTerm, arguments: tuple[Tensor, ...], values: Tensor) -> None:
+def check_finite(term: ElementTerm, arguments: Sequence[Tensor], values: Tensor) -> None:
     """Raises TorchfairError if residuals ``values`` (n, m) are not finite, because of the data or otherwise."""
     bad = rows(~torch.isfinite(values))
     if not bad:
@@ -33,7 +35,7 @@ def check_finite(term: ElementTerm, arguments: tuple[Tensor, ...], values: Tenso
     raise TorchfairError(f"{where}: move the start away from the singular place or leave these elements out")
 
 
-def check_merit(term: ElementTerm, arguments: tuple[Tensor, ...], values: Tensor) -> None:
+def check_merit(term: ElementTerm, arguments: Sequence[Tensor], values: Tensor) -> None:
     """Raises TorchfairError if the merit of an element is not finite or negative."""
     own = term.contributions(arguments, values)[:, None]
     bad = rows(~torch.isfinite(own))

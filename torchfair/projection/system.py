@@ -12,14 +12,15 @@ from torch import Tensor
 
 from ..errors import ShapeError
 from ..linear import LowerTriangle
-from ..linear.sparse import scatter_matrix
 from .affine import AffinePart
 from .block_diagonal import BlockDiagonal
 from .compiled import CompiledTerm
 from .layout import Layout, State
 from .linear_system import LinearSystem
 from .loss import apply_root
+from .node_sums import NodeSums
 from .normal_pattern import NormalPattern
+from .portions import Arguments, portions
 from .repeated_pattern import RepeatedPattern
 from .replicate import first_members
 from .row_pattern import RowPattern
@@ -33,13 +34,13 @@ class Evaluation(NamedTuple):
         state: The blocks.
         merits: (members,) sums of all terms, one for each member of a batch; infinity where a residual is not finite,
             so that such a state is never accepted.
-        arguments, values: Of each term of ``Structure.compiled``, unscaled.
+        arguments, values: Of each term of ``Structure.compiled``, unscaled; arguments are gathered when asked for.
         affine: Scaled residuals of the linear terms.
     """
 
     state: State
     merits: Tensor
-    arguments: list[tuple[Tensor, ...]]
+    arguments: list[Arguments]
     values: list[Tensor]
     affine: Tensor | None
 
@@ -101,7 +102,7 @@ class Structure:
             raise ShapeError("terms", f"{len(self.terms)} with elements and a weight", len(chosen))
         compiled = [known[id(before)].with_term(term) for before, term in zip(self.terms, chosen, strict=True)]
         result = copy.copy(self)
-        for stale in ("normal_pattern", "block_diagonal", "_outputs"):
+        for stale in ("normal_pattern", "block_diagonal", "_row_patterns"):
             result.__dict__.pop(stale, None)
         result._single = None
         result._take(compiled, self._like.dtype)
@@ -114,7 +115,7 @@ class Structure:
         """The structure with other unknowns (N,) that may move; index maps are kept."""
         result = copy.copy(self)
         result.free = free
-        for stale in ("normal_pattern", "block_diagonal", "_outputs"):
+        for stale in ("normal_pattern", "block_diagonal", "_row_patterns"):
             result.__dict__.pop(stale, None)
         result.affine = None if self.affine is None else self.affine.with_free(free)
         result._mask()
@@ -144,17 +145,15 @@ class Structure:
         return self.normal_pattern.lower
 
     @cached_property
-    def _scatter(self) -> Tensor:
-        """Sums local vectors ``(K, n)`` of all terms into the flat vector."""
-        index = torch.cat([c.unknowns.reshape(-1) for c in self.compiled])
-        return scatter_matrix(index, self.num_unknowns, self._like.dtype)
+    def _node_sums(self) -> NodeSums:
+        return NodeSums(self.layout, self.compiled, self._like)
 
-    def scatter(self, local: Sequence[Tensor]) -> Tensor:
-        """(N,) sum of local vectors ``(K, n)`` of the terms that are not linear."""
-        if not local:
-            return self._like.clone()
-        total: Tensor = self._scatter @ torch.cat([part.reshape(-1) for part in local])
-        return total
+    def scatter(self, local: Sequence[Tensor], factors: Sequence[Tensor] | None = None) -> Tensor:
+        """(N,) sum of local vectors ``(K, n)`` of the terms that are not linear.
+
+        With ``factors`` of the terms, ``(m, n)`` or ``(m, K, n)``: of ``(m, K, n)`` times these, components added.
+        """
+        return self._node_sums.vector(local, factors)
 
     def member_sums(self, local: Sequence[Tensor]) -> Tensor:
         """(members,) sums of local values ``(m, n)`` of the terms that are not linear."""
@@ -173,14 +172,15 @@ class Structure:
     @cached_property
     def block_diagonal(self) -> BlockDiagonal:
         """Diagonal blocks of the normal matrix and the map into them."""
-        return BlockDiagonal(self.layout, self.compiled, self.affine, self._like)
+        return BlockDiagonal(self.layout, self._node_sums, self.affine, self._like)
 
-    def row_pattern(self, outputs: tuple[int, ...]) -> RowPattern:
-        """Sparsity of the whole Jacobian, for the numbers of components of the residuals."""
-        if getattr(self, "_outputs", None) != outputs:
-            self._outputs = outputs
-            self._row_pattern = RowPattern(self.compiled, outputs, self.affine, self._like)
-        return self._row_pattern
+    def row_pattern(self, outputs: tuple[int, ...], *, whole: bool = True) -> RowPattern:
+        """Sparsity of the Jacobian, for the numbers of components of the residuals; with the linear terms if whole."""
+        known: dict[bool, tuple[tuple[int, ...], RowPattern]] = self.__dict__.setdefault("_row_patterns", {})
+        if whole not in known or known[whole][0] != outputs:
+            affine = self.affine if whole else None
+            known[whole] = outputs, RowPattern(self.compiled, outputs, affine, self._like)
+        return known[whole][1]
 
     def evaluate(self, state: State) -> Evaluation:
         """Residuals and merit of a state."""
@@ -209,7 +209,7 @@ class Structure:
     ) -> Evaluation:
         arguments, values, parts = [], [], [self._like.new_zeros(count)]
         for term in terms:
-            arguments.append(term.arguments(state))
+            arguments.append(term.arguments_at(state))
             values.append(term.values(arguments[-1]))
             contributions = term.contributions(arguments[-1], values[-1])
             parts.append(contributions.view(count, -1).sum(1).to(self._like))
@@ -235,14 +235,21 @@ class Structure:
         for compiled, free, arguments, values in zip(self.compiled, self._free, at.arguments, at.values, strict=True):
             roots.append(compiled.term.roots(values))
             residuals.append(apply_root(roots[-1], values).T)
-            jacobian = _scaled(compiled.term.jacobians(arguments), roots[-1])
+            jacobian = _scaled(arguments, roots[-1])
             jacobians.append(jacobian if free is None else jacobian.mul_(free))
         return LinearSystem(self, jacobians, residuals, roots, at.affine)
 
 
-def _scaled(jacobians: Tensor, root: Tensor) -> Tensor:
-    """Jacobians (n, m, K) times their roots, as (m, K, n)."""
-    if root.ndim == 3:
-        return torch.bmm(root, jacobians.contiguous()).permute(1, 2, 0).contiguous()
-    local = jacobians.permute(1, 2, 0)
-    return torch.mul(local, root, out=torch.empty_like(local, memory_format=torch.contiguous_format))
+def _scaled(arguments: Arguments, root: Tensor) -> Tensor:
+    """Jacobians of a term times their roots, as (m, K, n)."""
+    result: Tensor | None = None
+    for elements in portions(root.shape[0], root):
+        jacobians, own = arguments.term.jacobians(arguments.part(elements)), root[elements]
+        weighted = torch.bmm(own, jacobians.contiguous()) if own.ndim == 3 else jacobians
+        local = weighted.permute(1, 2, 0)
+        if result is None:
+            result = jacobians.new_empty(*local.shape[:2], root.shape[0])
+        out = result[..., elements]
+        out.copy_(local) if own.ndim == 3 else torch.mul(local, own, out=out)
+    assert result is not None
+    return result

@@ -14,6 +14,7 @@ from .differentiation import AutomaticWay, Way, as_rows, differentiate
 from .element_function import checked, mapped
 from .layout import Layout, State
 from .loss import Loss, Squares, apply_root, is_one_sided
+from .portions import Arguments, by_portions
 
 Residual = Callable[..., Tensor]
 Refresh = Callable[[State], Sequence[Tensor]]
@@ -87,17 +88,20 @@ class ElementTerm:
 
     def arguments(self, state: State) -> tuple[Tensor, ...]:
         """Arguments of :attr:`residual` for all elements at once: ``(n, k, d)`` locals, then the data."""
+        return tuple(self.arguments_at(state))
+
+    def arguments_at(self, state: State) -> Arguments:
+        """The same, gathered when they are needed; the data are those of the state."""
         for name, _ in self.stencil:
             if state[name].ndim != 2:
                 expected = f"(n, {state[name].shape[-1]}), of one member (constraints.Constraint takes batches)"
                 raise ShapeError(f"term '{self.name}', block '{name}'", expected, tuple(state[name].shape))
-        local = tuple(state[name][index] for name, index in self.stencil)
-        data = self.data
+        data, first = self.data, state[self.stencil[0][0]]
         if self.refresh is not None:
             data = self.refresh(state)
             what = f"term '{self.name}', data that refresh returns"
-            check_data(what, data, self.num_elements, local[0].dtype, local[0].device)
-        return (*local, *(tensor.detach() for tensor in data))
+            check_data(what, data, self.num_elements, first.dtype, first.device)
+        return Arguments(self, state, tuple(tensor.detach() for tensor in data))
 
     def roots(self, residuals: Tensor) -> Tensor:
         """Square roots (n,) or (n, m, m) of all weights of the quadratic model made at residuals ``(n, m)``."""
@@ -110,22 +114,22 @@ class ElementTerm:
             weights = weights * self.element_weights
         return apply_root(weights.sqrt(), root)
 
-    def values(self, arguments: tuple[Tensor, ...]) -> Tensor:
+    def values(self, arguments: Sequence[Tensor]) -> Tensor:
         """Residuals ``(n, m)``."""
-        return as_rows(mapped(self, "residual")(*arguments))
+        return as_rows(by_portions(mapped(self, "residual"), arguments))
 
     def missed(self, residuals: Tensor) -> Tensor:
         """Residuals ``(n, m)`` without what holds of inequalities."""
         return residuals.clamp_min(0.0) if is_one_sided(self.loss) else residuals
 
-    def contributions(self, arguments: tuple[Tensor, ...], residuals: Tensor) -> Tensor:
+    def contributions(self, arguments: Sequence[Tensor], residuals: Tensor) -> Tensor:
         """(n,) merit of every element."""
         if self.merit is None:
             own = self.loss.value(residuals)
             if own.shape != residuals.shape[:1]:
                 raise ShapeError(f"term '{self.name}', value of its loss", f"({len(residuals)},)", tuple(own.shape))
         else:
-            own = mapped(self, "merit")(*arguments)
+            own = by_portions(mapped(self, "merit"), arguments)
         value = self.weight * own
         return value if self.element_weights is None else value * self.element_weights
 
