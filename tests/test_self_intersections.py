@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from torchfair import Topology
 from torchfair._exact_triangles import meet_exactly
 from torchfair.errors import ShapeError
-from torchfair.self_intersections import self_intersections
+from torchfair.self_intersections import _near_pairs, self_intersections
 from torchfair.shapes import icosphere
 
 DOUBLE = torch.float64
@@ -110,3 +110,17 @@ def test_batches_are_refused() -> None:
     sphere = icosphere(0)
     with pytest.raises(ShapeError):
         self_intersections(sphere.vertices.expand(2, -1, -1), sphere.topology)
+
+
+@pytest.mark.parametrize("spread", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1e-9, 1.0), (0.0, 0.0, 0.0)])
+def test_boxes_that_meet_are_all_found_once_whatever_their_sizes(spread: tuple[float, float, float]) -> None:
+    """Against all pairs: among small triangles some that reach across all others; flat in some directions, too."""
+    random = np.random.default_rng(7)
+    triangles = random.uniform(0.0, 1.0, (150, 1, 3)) + random.normal(0.0, 0.02, (150, 3, 3))
+    triangles[:3] = random.uniform(0.0, 1.0, (3, 3, 3))
+    triangles *= spread
+    found = np.sort(np.concatenate(list(_near_pairs(triangles))), axis=1)
+    low, high = triangles.min(1), triangles.max(1)
+    meet = ((low[:, None] <= high) & (low <= high[:, None])).all(2)
+    expected = np.argwhere(np.triu(meet, 1))
+    assert np.array_equal(found[np.lexsort(found.T[::-1])], expected)

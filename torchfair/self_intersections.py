@@ -20,7 +20,9 @@ Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
 _SURE = 1e-12  # of the extent of the mesh: smaller gaps and overlaps are decided without rounding
-_MOST_PAIRS = 4_000_000  # of boxes that are looked at together
+_MOST_PAIRS = 1_000_000  # of boxes that are looked at together
+_MOST_CELLS = 2_000  # of the grid, along an axis
+_MOST_ENTRIES = 8  # of boxes in its cells, on average
 
 
 def self_intersections(vertices: Tensor, topology: Topology) -> Tensor:
@@ -69,44 +71,85 @@ def self_intersections(vertices: Tensor, topology: Topology) -> Tensor:
 
 
 def _near_pairs(p: Floats) -> Iterator[Ints]:
-    """Pairs (n, 2) of triangles (F, 3, 3) whose boxes meet, some at a time."""
+    """Pairs (n, 2) of triangles (F, 3, 3) whose boxes meet, some at a time.
+
+    Every box is entered into the cells of a grid that it meets, cells of about the size of the boxes; a pair belongs to
+    the cell in which both boxes begin.
+    """
     low, high = p.min(1), p.max(1)
     if not len(p):
         return
-    axis = int(np.ptp(low, axis=0).argmax())
-    others = [other for other in range(3) if other != axis]
-    order = np.argsort(low[:, axis], kind="stable")
-    low, high = low[order], high[order]
-    last = np.searchsorted(low[:, axis], high[:, axis], side="right")
-    counts = last - np.arange(len(p)) - 1
+    first_cell, last_cell, shape = _cells(low, high)
+    sizes = last_cell - first_cell + 1
+    owner = np.repeat(np.arange(len(p)), sizes.prod(1))
+    within = ranges(np.zeros(len(p), np.int64), sizes.prod(1))
+    across = sizes[owner]
+    x, rest = within // (across[:, 1] * across[:, 2]), within % (across[:, 1] * across[:, 2])
+    steps = np.stack([x, rest // across[:, 2], rest % across[:, 2]], 1)
+    cell = np.ravel_multi_index(tuple((first_cell[owner] + steps).T), shape)
+    order = np.argsort(cell, kind="stable")
+    cell, owner = cell[order], owner[order]
+    counts = np.searchsorted(cell, cell, side="right") - np.arange(len(cell)) - 1
     total = np.cumsum(counts)
     start = 0
-    while start < len(p):
+    while start < len(cell):
         before = total[start - 1] if start else 0
         stop = max(start + 1, int(np.searchsorted(total, before + _MOST_PAIRS)))
         here, own = np.arange(start, stop), counts[start:stop]
-        first, second = np.repeat(here, own), ranges(here + 1, own)
-        for other in others:
-            close = (low[first, other] <= high[second, other]) & (low[second, other] <= high[first, other])
-            first, second = first[close], second[close]
-        yield np.stack([order[first], order[second]], 1)
+        place, second = np.repeat(here, own), owner[ranges(here + 1, own)]
+        first = owner[place]
+        for axis in range(3):
+            close = (low[first, axis] <= high[second, axis]) & (low[second, axis] <= high[first, axis])
+            place, first, second = place[close], first[close], second[close]
+        begins = np.ravel_multi_index(tuple(np.maximum(first_cell[first], first_cell[second]).T), shape)
+        mine = begins == cell[place]
+        yield np.stack([first[mine], second[mine]], 1)
         start = stop
+
+
+def _cells(low: Floats, high: Floats) -> tuple[Ints, Ints, tuple[int, int, int]]:
+    """First and last cell (F, 3) of every box in a grid, and its shape; no more than some entries for every box."""
+    origin, extent = low.min(0), high.max(0) - low.min(0)
+    size = max(2.0 * float((high - low).mean()), float(extent.max()) / _MOST_CELLS)
+    while True:
+        counts = np.clip(np.floor(extent / size), 1, _MOST_CELLS).astype(np.int64) if size > 0.0 else np.ones(3, int)
+        scale = np.divide(counts, extent, out=np.zeros(3), where=extent > 0.0)
+        first, last = (np.clip(((x - origin) * scale).astype(np.int64), 0, counts - 1) for x in (low, high))
+        if (last - first + 1).prod(1).sum() <= _MOST_ENTRIES * len(low) or (counts == 1).all():
+            return first, last, (int(counts[0]), int(counts[1]), int(counts[2]))
+        size *= 2.0
 
 
 def _meet(p: Floats, pairs: Ints, margin: float) -> Mask:
     """Whether triangles without a common vertex have a common point."""
     a, b = p[pairs[:, 0]], p[pairs[:, 1]]
-    gaps = np.full(len(pairs), -np.inf)
+    left = np.arange(len(pairs))
+    for normal in _normals(a), _normals(b):  # along these nearly all of them are apart
+        left = left[_gaps(a[left], b[left], normal[left]) <= margin]
+    a, b = a[left], b[left]
+    gaps = np.full(len(left), -np.inf)
     for axes in _axes(a, b):
-        length = np.linalg.norm(axes, axis=1)
-        unit = axes / np.maximum(length, 1e-300)[:, None]
-        s, t = (np.einsum("nij,nj->ni", x - a[:, :1], unit) for x in (a, b))
-        gap = np.maximum(t.min(1) - s.max(1), s.min(1) - t.max(1))
-        gaps = np.maximum(gaps, np.where(length > 0.0, gap, -np.inf))
-    result: Mask = gaps < -margin
+        gaps = np.maximum(gaps, _gaps(a, b, axes))
+    result: Mask = np.zeros(len(pairs), bool)
+    result[left] = gaps < -margin
     for doubtful in np.flatnonzero(np.abs(gaps) <= margin):
-        result[doubtful] = meet_exactly(a[doubtful], b[doubtful])
+        result[left[doubtful]] = meet_exactly(a[doubtful], b[doubtful])
     return result
+
+
+def _gaps(a: Floats, b: Floats, axes: Floats) -> Floats:
+    """(n,) by how much triangles are apart along axes (n, 3) of any length; negative where they overlap."""
+    length = np.linalg.norm(axes, axis=1)
+    unit = axes / np.maximum(length, 1e-300)[:, None]
+    s, t = (np.einsum("nij,nj->ni", x - a[:, :1], unit) for x in (a, b))
+    gaps: Floats = np.where(length > 0.0, np.maximum(t.min(1) - s.max(1), s.min(1) - t.max(1)), -np.inf)
+    return gaps
+
+
+def _normals(a: Floats) -> Floats:
+    """(n, 3) of triangles (n, 3, 3), of any length."""
+    normals: Floats = np.cross(a[:, 1] - a[:, 0], a[:, 2] - a[:, 1])
+    return normals
 
 
 def _axes(a: Floats, b: Floats) -> Iterator[Floats]:
@@ -134,22 +177,31 @@ def _meet_elsewhere(p: Floats, triangles: Ints, pairs: Ints, margin: float) -> M
     rows = np.arange(len(pairs))[:, None]
     a, b = (p[pairs[:, side]][rows, (turn[:, None] + np.arange(3)) % 3] for side, turn in enumerate(turns))
     s, t = (x[:, 1:] - x[:, :1] for x in (a, b))  # the two sides at the common vertex
-    apart = np.zeros(len(pairs), bool)
-    for axes in _wedge_axes(s, t):
-        axes = axes / np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), 1e-300)
-        low, high = np.einsum("nij,nj->ni", s, axes).min(1), np.einsum("nij,nj->ni", t, axes).max(1)
-        apart |= (low > margin) & (high < -margin)
+    left = np.arange(len(pairs))
+    for some in _middle_axes, _wedge_axes:  # the first ones tell most of them apart
+        here, there = s[left], t[left]
+        apart = np.zeros(len(left), bool)
+        for axes in some(here, there):
+            axes = axes / np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), 1e-300)
+            low, high = np.einsum("nij,nj->ni", here, axes).min(1), np.einsum("nij,nj->ni", there, axes).max(1)
+            apart |= (low > margin) & (high < -margin)
+        left = left[~apart]
     result = np.zeros(len(pairs), bool)
-    for doubtful in np.flatnonzero(~apart):
+    for doubtful in left:
         result[doubtful] = meet_exactly(a[doubtful], b[doubtful], common=True)
     return result
 
 
-def _wedge_axes(s: Floats, t: Floats) -> Iterator[Floats]:
+def _middle_axes(s: Floats, t: Floats) -> Iterator[Floats]:
     """Directions along which two wedges, spanned by (n, 2, 3) sides, may lie on different sides of their tip."""
     s, t = (x / np.linalg.norm(x, axis=2, keepdims=True) for x in (s, t))
     middles = [x.sum(1) / np.linalg.norm(x.sum(1), axis=1, keepdims=True).clip(1e-300) for x in (s, t)]
     yield middles[0] - middles[1]
+
+
+def _wedge_axes(s: Floats, t: Floats) -> Iterator[Floats]:
+    """More directions of that kind."""
+    s, t = (x / np.linalg.norm(x, axis=2, keepdims=True) for x in (s, t))
     normals = [np.cross(x[:, 0], x[:, 1]) for x in (s, t)]
     for i in range(2):
         for j in range(2):  # a plane that nearly holds one side of each

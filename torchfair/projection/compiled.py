@@ -34,8 +34,13 @@ class CompiledTerm:
     @property
     def unknowns(self) -> Tensor:
         """(K, n) flat number of each unknown of each element; made anew whenever it is asked for."""
+        return self.unknowns_of(slice(None))
+
+    def unknowns_of(self, elements: slice) -> Tensor:
+        """Those of some elements."""
         rows = []
-        for name, index in self.term.stencil:
+        for name, whole in self.term.stencil:
+            index = whole[elements]
             width = self._layout.sizes[name][1]
             components = self._layout.offset(name) + torch.arange(width, device=index.device)
             rows.append((index.T[:, None] * width + components[:, None]).flatten(0, 1))

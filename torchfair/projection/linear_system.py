@@ -11,6 +11,7 @@ from torch import Tensor
 
 from ..linear.block_inverse import block_inverse
 from .loss import apply_root
+from .portions import portions
 
 if TYPE_CHECKING:
     from .system import Evaluation, Structure
@@ -78,10 +79,13 @@ class LinearSystem:
 
     def changes(self, step: Tensor) -> tuple[list[Tensor], Tensor | None]:
         """By how much a step (N,) changes the residuals of the model: of each term (m, n), and of the linear terms."""
-        terms = [
-            torch.einsum("mkn,kn->mn", jacobian, step[compiled.unknowns])
-            for compiled, jacobian in zip(self.structure.compiled, self.jacobians, strict=True)
-        ]
+        terms = []
+        for compiled, jacobian in zip(self.structure.compiled, self.jacobians, strict=True):
+            parts = [
+                torch.einsum("mkn,kn->mn", jacobian[..., elements], step[compiled.unknowns_of(elements)])
+                for elements in portions(jacobian.shape[2], jacobian)
+            ]
+            terms.append(parts[0] if len(parts) == 1 else torch.cat(parts, 1))
         return terms, None if self.structure.affine is None else self.structure.affine.change(step)
 
     def predicted_fall(self, step: Tensor) -> Tensor:
