@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ._ops import dot, gather
-from .patches import Patches
+from .patches import Patches, PatchGroup
 from .tangent_basis import tangent_bases
 
 _RIDGE = 1e-13  # keeps what the members leave open at zero, higher orders first
@@ -17,6 +17,7 @@ _NEARNESS = 2.0  # how fast weights fall with the square of the distance
 _POOLING = 2  # times over patches
 _ROUNDING = 1e-12  # of mean squares
 _LEAST_FREEDOM = 0.5
+_NEEDED = 6  # terms up to the second order
 _MOST_DOUBT = 1e4  # most that the noise of a coefficient may exceed the coefficient expected
 
 
@@ -27,7 +28,7 @@ class Heights(NamedTuple):
         frames: (*batch, V, 3, 3), two tangent vectors and the normal of the plane.
         scale: (*batch, V) root mean square distance of the members, the unit of x, y and z.
         coefficients: (*batch, V, p) of ``1, x, y, x^2, x y, y^2, ...``.
-        covariance: (*batch, V, p, p) of the coefficients, as far as what is left over is noise.
+        covariance: (*batch, V, 6, 6) of the coefficients up to the second order, as far as what is left over is noise.
     """
 
     frames: Tensor
@@ -61,58 +62,95 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     the curvatures as can be told.
     """
     frames = torch.cat([tangent_bases(normals), normals[..., None, :]], dim=-2).double()
-    moments = _moments(vertices, normals, frames, patches, degree)
     ridge = [_RIDGE * 100.0**order * share for (order, _), share in zip(_terms(degree), _shares(degree), strict=True)]
-    least = torch.diag(moments.matrix.new_tensor(ridge))
-    matrix = moments.matrix + least
-    inverse = torch.linalg.inv_ex(matrix).inverse
+    least = torch.diag(frames.new_tensor(ridge))
+    # Matrices of all vertices would take kilobytes for each, so they are made for one group of patches at a time, and
+    # made again where they are needed once more; those of a small mesh are kept.
+    kept: list[_Moments] = []
+    fits = []
+    for group in patches.groups:
+        moments = _moments(vertices, normals, frames, group, degree)
+        if len(patches.groups) == 1:
+            kept.append(moments)
+        fits.append(_plain_fit(moments, least, with_covariance=degree <= 2))
+    coefficients, spread, variance = (patches.in_order([fit[i] for fit in fits]) for i in range(3))
+    scale = patches.in_order([fit.scale for fit in fits]).squeeze(-1)
+    if degree <= 2:
+        covariance = patches.in_order([fit.covariance for fit in fits])
+        return Heights(frames, scale, coefficients, covariance.unflatten(-1, least.shape))
+    del fits
+    variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
+    believed = []
+    for group in patches.groups:
+        moments = kept[0] if kept else _moments(vertices, normals, frames, group, degree)
+        own = gather(doubts, group.centres), gather(variance[..., None], group.centres).squeeze(-1)
+        believed.append(_believed_fit(moments, least, *own))
+    coefficients = patches.in_order([fit[0] for fit in believed])
+    covariance = patches.in_order([fit[1] for fit in believed])
+    return Heights(frames, scale, coefficients, covariance.unflatten(-1, (_NEEDED, _NEEDED)))
+
+
+class _Fit(NamedTuple):
+    """What the plain fit of a group tells, (*batch, n, ...)."""
+
+    coefficients: Tensor
+    spread: Tensor  # variances of the coefficients per variance of the noise
+    variance: Tensor  # of the noise
+    scale: Tensor
+    covariance: Tensor  # flat; empty unless asked for
+
+
+def _plain_fit(moments: _Moments, least: Tensor, *, with_covariance: bool) -> _Fit:
+    inverse = torch.linalg.inv_ex(moments.matrix + least).inverse
     coefficients = (inverse @ moments.right[..., None]).squeeze(-1)
     variance = _variance(moments, coefficients, inverse)
     noisy = moments.twice_weighted + least  # noise enters the right side with the weights, so their squares are here
-    if degree > 2:
-        spread = (inverse @ noisy * inverse).sum(-1) / moments.weight[..., None]
-        variance, doubts = _prior(coefficients, spread, variance, degree, patches)
-        doubts = torch.diag_embed(doubts / moments.weight[..., None])
-        inverse, noisy = torch.linalg.inv_ex(matrix + doubts).inverse, noisy + doubts
-        coefficients = (inverse @ moments.right[..., None]).squeeze(-1)
-    covariance = inverse @ noisy @ inverse * (variance / moments.weight)[..., None, None]
-    return Heights(frames, moments.scale, coefficients, covariance)
+    spread = (inverse @ noisy * inverse).sum(-1) / moments.weight[..., None]
+    covariance = coefficients[..., :0]
+    if with_covariance:
+        covariance = (inverse @ noisy @ inverse * (variance / moments.weight)[..., None, None]).flatten(-2)
+    return _Fit(coefficients, spread, variance[..., None], moments.scale[..., None], covariance)
+
+
+def _believed_fit(moments: _Moments, least: Tensor, doubts: Tensor, variance: Tensor) -> tuple[Tensor, Tensor]:
+    """Coefficients, and flat covariances of those up to the second order, with terms believed as far as they are."""
+    ridge = least + torch.diag_embed(doubts / moments.weight[..., None])
+    inverse = torch.linalg.inv_ex(moments.matrix + ridge).inverse
+    coefficients = (inverse @ moments.right[..., None]).squeeze(-1)
+    few = inverse[..., :_NEEDED, :]
+    covariance = few @ (moments.twice_weighted + ridge) @ few.mT * (variance / moments.weight)[..., None, None]
+    return coefficients, covariance.flatten(-2)
 
 
 class _Moments(NamedTuple):
-    """Weighted means of products over the members: matrix (*batch, V, p, p), right side (*batch, V, p), and more."""
+    """Weighted means of products over the members: matrix (*batch, n, p, p), right side (*batch, n, p), and more."""
 
     matrix: Tensor
     twice_weighted: Tensor  # the same with squared weights
     right: Tensor
-    square: Tensor  # of the heights (*batch, V)
-    weight: Tensor  # sum (*batch, V)
+    square: Tensor  # of the heights (*batch, n)
+    weight: Tensor  # sum (*batch, n)
     scale: Tensor
 
 
-def _moments(vertices: Tensor, normals: Tensor, frames: Tensor, patches: Patches, degree: int) -> _Moments:
-    size = len(_terms(degree)) + 1
-    parts = []
-    for centres, members, present in patches.groups:
-        apart = (gather(vertices, members) - gather(vertices, centres)[..., None, :]).double()
-        facing = dot(gather(normals, members), gather(normals, centres)[..., None, :]).double()
-        weights = facing.clamp_min(0.0).square() * present
-        distance = dot(apart, apart)
-        weights = weights * torch.exp(-_NEARNESS * distance / _mean(distance, weights))
-        total = weights.sum(-1, keepdim=True)
-        total = torch.where(total > 0.0, total, 1.0)
-        scale = _mean(distance, weights).sqrt()
-        local = (apart / scale[..., None]) @ frames.index_select(-3, centres).mT
-        x, y, z = local.unbind(-1)
-        rows = torch.stack([*_monomials(x, y, degree), z], dim=-1)
-        weighted = rows * (weights / total)[..., None]
-        products, squares = weighted.mT @ rows, weighted.mT @ (rows * weights[..., None])
-        parts.append(torch.cat([products.flatten(-2), squares.flatten(-2), total, scale], dim=-1))
-    whole = patches.in_order(parts)
-    products, squares = whole[..., :-2].reshape((*whole.shape[:-1], 2, size, size)).unbind(-3)
+def _moments(vertices: Tensor, normals: Tensor, frames: Tensor, group: PatchGroup, degree: int) -> _Moments:
+    centres, members, present = group
+    apart = (gather(vertices, members) - gather(vertices, centres)[..., None, :]).double()
+    facing = dot(gather(normals, members), gather(normals, centres)[..., None, :]).double()
+    weights = facing.clamp_min(0.0).square() * present
+    distance = dot(apart, apart)
+    weights = weights * torch.exp(-_NEARNESS * distance / _mean(distance, weights))
+    total = weights.sum(-1, keepdim=True)
+    total = torch.where(total > 0.0, total, 1.0)
+    scale = _mean(distance, weights).sqrt()
+    local = (apart / scale[..., None]) @ frames.index_select(-3, centres).mT
+    x, y, z = local.unbind(-1)
+    rows = torch.stack([*_monomials(x, y, degree), z], dim=-1)
+    weighted = rows * (weights / total)[..., None]
+    products, squares = weighted.mT @ rows, weighted.mT @ (rows * weights[..., None])
     return _Moments(
         products[..., :-1, :-1], squares[..., :-1, :-1], products[..., :-1, -1], products[..., -1, -1],
-        whole[..., -2], whole[..., -1],
+        total.squeeze(-1), scale.squeeze(-1),
     )  # fmt: skip
 
 
