@@ -16,6 +16,8 @@ from ..rasterisation.rasterise import visible_triangles
 from ..topology import Topology
 from ..triangulation import triangulate
 
+_PORTION = 1 << 18  # points looked at together
+
 _SLACK = (1.5, 1e-3)
 """What is not counted as in front: pixels along the slope of the nearest triangle, and a part of the depth range."""
 
@@ -59,19 +61,32 @@ def edge_visibility(
     triangles = triangulate(mesh, topology).triangles
     ends = mesh[topology.interior_edges]
     steps = (torch.arange(samples, device=mesh.device, dtype=mesh.dtype) + 0.5) / samples
-    along = torch.lerp(ends[:, :1], ends[:, 1:], steps[:, None]).reshape(-1, 3)
     normals = face_normals(mesh, topology)[topology.interior_edge_faces]
     sides = dot(normals, camera.view_directions(ends.mean(1))[..., None, :]).sign()  # (views, I, 2)
     same_side = sides.prod(-1) > 0
-    seen = [
-        _seen(places, points, triangles, visible_triangles(points, triangles, pixels[1], pixels[0]))
-        for places, points in zip(camera.project(along, size), camera.project(mesh, size), strict=True)
+    views = [
+        (points, visible_triangles(points, triangles, pixels[1], pixels[0]), _extent(points))
+        for points in camera.project(mesh, size)
     ]
-    shares = torch.stack(seen).view(len(seen), -1, samples).to(mesh.dtype).mean(-1)
-    return (same_side * shares).to(vertices)
+    shares = []
+    for some in torch.split(ends, max(1, _PORTION // samples)):
+        along = torch.lerp(some[:, :1], some[:, 1:], steps[:, None]).reshape(-1, 3)
+        seen = [
+            _seen(places, points, triangles, nearest, extent).view(-1, samples).to(mesh.dtype).mean(-1)
+            for places, (points, nearest, extent) in zip(camera.project(along, size), views, strict=True)
+        ]
+        shares.append(torch.stack(seen))
+    return (same_side * torch.cat(shares, 1)).to(vertices)
 
 
-def _seen(places: Tensor, points: Tensor, triangles: Tensor, nearest: Tensor) -> Tensor:
+def _extent(points: Tensor) -> Tensor | float:
+    """Range of the depths of projected points (V, 3)."""
+    levels = points[:, 2]
+    levels = levels[torch.isfinite(levels)]
+    return levels.amax() - levels.amin() if levels.shape[0] else 0.0
+
+
+def _seen(places: Tensor, points: Tensor, triangles: Tensor, nearest: Tensor, extent: Tensor | float) -> Tensor:
     """Whether projected places (N, 3) lie on or before the surface at their pixel, inside the picture: (N,)."""
     height, width = nearest.shape
     row, column = places[:, 1].floor(), places[:, 0].floor()
@@ -80,8 +95,5 @@ def _seen(places: Tensor, points: Tensor, triangles: Tensor, nearest: Tensor) ->
     triangle = nearest[row[inside].long(), column[inside].long()]
     covered = inside[triangle >= 0]
     depths, slopes = plane_depths(points, triangles, triangle[triangle >= 0], places[covered, :2])
-    levels = points[:, 2]
-    levels = levels[torch.isfinite(levels)]
-    extent = levels.amax() - levels.amin() if levels.shape[0] else 0.0
     seen[covered] = places[covered, 2] <= depths + _SLACK[0] * slopes + _SLACK[1] * extent
     return seen
