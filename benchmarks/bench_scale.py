@@ -14,8 +14,8 @@ step           a damped step on E, umbrella fairness and closeness (``torus_prob
                the mean over some steps from the start, set-up left out; peak memory with set-up
 setup          the index maps of that problem and its first linearisation
 obj, ply       reading the bumpy torus of ``scale_mesh.py`` from a file (ASCII OBJ, binary PLY)
-measure, ...   the command on that file: ``measure``, ``diagnose``, ``reflect --no-pictures``, ``pictures`` (reflect),
-               ``fair`` with ``--fair-steps`` steps (per step is in the last column)
+measure, ...   the command on that file, imports included: ``measure``, ``diagnose``, ``reflect --no-pictures``,
+               ``pictures`` (``reflect``), ``fair`` with at most ``--fair-steps`` steps in each of its runs
 =============  =========================================================================================
 """
 
@@ -109,23 +109,22 @@ def read(path: str) -> None:
     _report(seconds=time.process_time() - start)
 
 
-def command(arguments: list[str]) -> None:
-    """A command."""
-    import time
-
-    from torchfair.cli import main
-
-    start = time.process_time()
-    code = main(arguments)
-    _report(seconds=time.process_time() - start, code=float(code or 0))
-
-
 # What starts them. --------------------------------------------------------------------------------------------------
 
 
 def run(tree: Path, work: list[str], threads: int) -> dict[str, float]:
     """Figures of one task in a process of its own, with the library of a source tree."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tree), str(HERE)]), "OMP_NUM_THREADS": str(threads)}
+    if work[0] == "command":
+        process = subprocess.Popen(
+            [sys.executable, "-m", "torchfair", *work[1:]],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        _, status, usage = os.wait4(process.pid, 0)
+        seconds, peak = usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024 / 1e9
+        return {"seconds": seconds, "peak_gb": peak, "code": float(os.waitstatus_to_exitcode(status))}
     ended = subprocess.run(
         [sys.executable, str(HERE / "bench_scale.py"), "--work", *work], env=environment, capture_output=True, text=True
     )
@@ -207,7 +206,6 @@ WORK: dict[str, Callable[[list[str]], None]] = {
     "energy": lambda given: energy(int(given[0]), int(given[1])),
     "step": lambda given: step(int(given[0]), int(given[1])),
     "read": lambda given: read(given[0]),
-    "command": command,
 }
 
 if __name__ == "__main__":

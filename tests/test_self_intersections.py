@@ -112,7 +112,9 @@ def test_batches_are_refused() -> None:
         self_intersections(sphere.vertices.expand(2, -1, -1), sphere.topology)
 
 
-@pytest.mark.parametrize("spread", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1e-9, 1.0), (0.0, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    "spread", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1e-9, 1.0), (0.0, 0.0, 0.0)]
+)
 def test_boxes_that_meet_are_all_found_once_whatever_their_sizes(spread: tuple[float, float, float]) -> None:
     """Against all pairs: among small triangles some that reach across all others; flat in some directions, too."""
     random = np.random.default_rng(7)

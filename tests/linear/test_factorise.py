@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,7 @@ import scipy.sparse as sp
 import torch
 from torch import Tensor
 
-from torchfair import ShapeError
+from torchfair import ShapeError, _memory
 from torchfair.errors import SettingsError, SingularSystemError
 from torchfair.linear import (
     BlockByBlock,
@@ -24,6 +25,7 @@ from torchfair.linear import (
     RslabDirect,
     ScipyDirect,
     Solution,
+    choose,
     choose_solver,
     factorise,
 )
@@ -240,8 +242,35 @@ def test_the_choice_follows_size_device_and_what_is_installed(
     monkeypatch: pytest.MonkeyPatch, size: int, device: str, rslab: bool, name: str
 ) -> None:
     monkeypatch.setattr(RslabDirect, "available", staticmethod(lambda: rslab))
+    monkeypatch.setattr(choose, "available_memory", lambda: None)
     pattern = SimpleNamespace(num_unknowns=size, device=torch.device(device))
     assert choose_solver("auto", pattern).name == name
+
+
+@pytest.mark.parametrize(("rslab", "size", "gigabytes"), [(True, 200_000, 5.7), (False, 30_000, 1.8)])
+def test_no_factorisation_is_chosen_that_does_not_fit_in_memory(
+    monkeypatch: pytest.MonkeyPatch, rslab: bool, size: int, gigabytes: float
+) -> None:
+    """Half of what is left has to be enough; below it the matrix is never formed."""
+    monkeypatch.setattr(RslabDirect, "available", staticmethod(lambda: rslab))
+    pattern = SimpleNamespace(num_unknowns=size, device=torch.device("cpu"))
+    for share, name in ((1.0, "rslab" if rslab else "scipy"), (0.98, "conjugate gradients")):
+        monkeypatch.setattr(choose, "available_memory", lambda share=share: int(share * gigabytes * 1e9))
+        assert choose_solver("auto", pattern).name == name
+
+
+def test_memory_that_is_left_is_less_than_there_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """In a container what that leaves counts; a limit that is none, or no files at all, count for nothing."""
+    files = {name: tmp_path / name for name in ("system", "most", "taken")}
+    monkeypatch.setattr(_memory, "_SYSTEM", files["system"])
+    monkeypatch.setattr(_memory, "_GROUP", (files["most"], files["taken"]))
+    files["system"].write_text("MemTotal: 9000 kB\nMemAvailable:  5000 kB\n")
+    assert _memory.available_memory() == 5000 * 1024
+    files["most"].write_text("4000000\n")
+    files["taken"].write_text("1000000\n")
+    assert _memory.available_memory() == 3_000_000
+    files["most"].write_text("max\n")
+    assert _memory.available_memory() == 5000 * 1024
 
 
 def test_descending_stops_where_the_quadratic_hardly_falls_any_more() -> None:

@@ -77,7 +77,7 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     scale = patches.in_order([fit.scale for fit in fits]).squeeze(-1)
     if degree <= 2:
         covariance = patches.in_order([fit.covariance for fit in fits])
-        return Heights(frames, scale, coefficients, covariance.unflatten(-1, least.shape))
+        return Heights(frames, scale, coefficients, covariance.view(*scale.shape, *least.shape))
     del fits
     variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
     believed = []
@@ -87,7 +87,7 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
         believed.append(_believed_fit(moments, least, *own))
     coefficients = patches.in_order([fit[0] for fit in believed])
     covariance = patches.in_order([fit[1] for fit in believed])
-    return Heights(frames, scale, coefficients, covariance.unflatten(-1, (_NEEDED, _NEEDED)))
+    return Heights(frames, scale, coefficients, covariance.view(*scale.shape, _NEEDED, _NEEDED))
 
 
 class _Fit(NamedTuple):

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from .runs import expand_counts, run_chunks
 
+_TRIANGLES = 1 << 18  # scanned at a time on a CPU: most of a large mesh cover no pixel
 _CHUNK = 1 << 17  # pixels handed out at a time on a CPU: keeps every temporary inside the cache
 
 
@@ -38,6 +39,14 @@ def triangle_spans(points: Tensor, triangles: Tensor, width: int, height: int) -
         ---x--x---    pixels ceil(left - 1/2) .. ceil(right - 1/2) - 1
           /____\
     """
+    portion = _TRIANGLES if triangles.is_cpu else max(triangles.shape[0], 1)
+    some = enumerate(torch.split(triangles, portion))
+    parts = [_spans(points, chosen, number * portion, width, height) for number, chosen in some]
+    return parts[0] if len(parts) == 1 else Spans(*(torch.cat(columns) for columns in zip(*parts, strict=True)))
+
+
+def _spans(points: Tensor, triangles: Tensor, before: int, width: int, height: int) -> Spans:
+    """Those of some triangles, of which so many come before."""
     corners = points.detach()[triangles].to(torch.float64)
     corners = torch.where(torch.isfinite(corners).all(-1).all(-1)[:, None, None], corners, 0)
     top = _first_centre(corners[..., 1].amin(1), height)
@@ -49,7 +58,7 @@ def triangle_spans(points: Tensor, triangles: Tensor, width: int, height: int) -
     filled = stop > start
     triangle, row, start, stop = triangle[filled], row[filled], start[filled], stop[filled]
     depth, step = _depths(corners, triangle, row, start, stop)
-    return Spans(triangle, row, start, stop - start, depth, step)
+    return Spans(triangle + before, row, start, stop - start, depth, step)
 
 
 def span_chunks(spans: Spans) -> Iterator[tuple[Tensor, Tensor]]:

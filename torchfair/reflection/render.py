@@ -26,6 +26,7 @@ from .environments import Environment
 Shading = Literal["flat", "smooth"]
 
 _MOST = 1 << 23  # samples worked on at a time
+_MOST_FACES = 1 << 20  # of all pictures that are worked on at a time
 
 
 class Reflection(NamedTuple):
@@ -156,7 +157,7 @@ def _pictures(
         colors, faces = (part.expand(*batch, *part.shape) for part in one)
         return colors + vertices.sum((-2, -1))[..., None, None, None], faces
     meshes, normals = (part.reshape(math.prod(batch), *part.shape[-2:]) for part in (vertices, normals))
-    mesh_step, view_step = _steps(meshes.shape[0], views, height_and_width(around.size))
+    mesh_step, view_step = _steps(topology.num_faces, views, height_and_width(around.size))
     rows = []
     for first in range(0, max(meshes.shape[0], 1), mesh_step):
         chosen = slice(first, first + mesh_step)
@@ -207,9 +208,9 @@ def _differentiated(*tensors: Tensor) -> bool:
     return reverse or any(tangent is not None for tangent in forward)
 
 
-def _steps(meshes: int, views: int, size: tuple[int, int]) -> tuple[int, int]:
-    """How many meshes and views to work on at a time."""
-    most = max(1, _MOST // (size[0] * size[1]))
+def _steps(faces: int, views: int, size: tuple[int, int]) -> tuple[int, int]:
+    """How many meshes of so many faces, and views, to work on at a time."""
+    most = max(1, min(_MOST // (size[0] * size[1]), _MOST_FACES // max(1, faces)))
     return (max(1, most // views), views) if most >= views else (1, most)
 
 
