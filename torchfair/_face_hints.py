@@ -22,19 +22,18 @@ def of_sizes(offsets: Ints) -> str:
     return f" If the columns are the faces, an array (3, {sizes[0]}), pass faces.T."
 
 
-def of_repeats(corners: Ints, faces: Ints, repeated: Ints) -> str:
+def of_repeats(corners: Ints, offsets: Ints, repeated: Ints) -> str:
     """A hint where all faces with a repeated corner are quads ``[a, b, c, c]``, or where faces may be columns.
 
     Args:
         corners: (H,) vertex at each corner.
-        faces: (H,) face of each corner, in order.
+        offsets: (F+1,) of packed faces.
         repeated: faces that use a vertex more than once.
     """
-    bounds = np.searchsorted(faces, np.arange(int(faces[-1]) + 2))
-    rows = [corners[bounds[face] : bounds[face + 1]] for face in repeated.tolist()]
+    rows = [corners[offsets[face] : offsets[face + 1]] for face in repeated.tolist()]
     if all(len(row) == _QUAD and row[2] == row[3] and len(set(row.tolist())) == _QUAD - 1 for row in rows):
         return " [a, b, c, c] for a triangle: leave out the last one, as torchfair.repair_mesh does."
-    return of_sizes(bounds)
+    return of_sizes(offsets)
 
 
 def of_numbers(outside: Ints) -> str:

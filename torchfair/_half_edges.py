@@ -211,5 +211,5 @@ def _check_repeats(half: HalfEdges) -> None:
             f"{repeated.size} face(s) use a vertex more than once: faces ",
             few("face", repeated),
             ". Remove the repeated corner, or the face if fewer than three corners remain."
-            + _face_hints.of_repeats(corners, face_ids, repeated),
+            + _face_hints.of_repeats(half.corners, half.offsets, repeated),
         )
