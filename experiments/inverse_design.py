@@ -1,10 +1,10 @@
 """Handles are found so that the finished mesh, which a whole job makes of them, does what is wanted.
 
-Two designs with hidden handles are made, and found again from what they do: a surface of least C from points that it
-passes through, a mesh of least E from pictures of stripes that it mirrors. What is wanted is a function of the finished
-mesh, the mesh a function of its handles (`JobLayer`): Adam finds these with gradients through the solve. The same, from
-the same start, with gradients by implicit differentiation, by unrolling ten Gauss-Newton steps, and (for a few steps
-only) by finite differences.
+Designs with hidden handles are made, and found again from what they do: a surface of least C from points that it
+passes through, a mesh of least E from pictures of stripes that it mirrors (`--designs reflection`). What is wanted is a
+function of the finished mesh, the mesh a function of its handles (`JobLayer`): Adam finds these with gradients through
+the solve. The same, from the same start, with gradients by implicit differentiation, by unrolling ten Gauss-Newton
+steps, and (for a few steps only) by finite differences.
 """
 
 from __future__ import annotations
@@ -46,9 +46,11 @@ STRIPES = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], dtype=torch.float64)
 class Config(ExperimentConfig):
     """Settings of the experiment."""
 
-    designs: tuple[str, ...] = setting(("points", "reflection"), "what is looked for", choices=("points", "reflection"))
+    designs: tuple[str, ...] = setting(("points",), "what is looked for", choices=("points", "reflection"))
     vertices: int = setting(80, "vertices of the surface of least C, about", least=40)
-    smoothing: float = setting(0.3, "of C, as a fraction of the mean curvature of a star", least=1e-6)
+    smoothing: float = setting(
+        0.3, "of E, in mean edges, and of C, as a fraction of the mean curvature of a star", least=1e-6
+    )
     rows: int = setting(8, "cells along the mesh of least E", least=4)
     handles: int = setting(2, "handles of each design", least=1)
     points: int = setting(8, "points that the surface of least C is to pass through", least=1)
@@ -133,7 +135,7 @@ def mirroring(config: Config) -> Design:
     vertices, topology = mesh.vertices, mesh.topology
     chosen = spread(vertices, topology, config.handles)
     handles = dict(zip(chosen.tolist(), vertices[chosen].tolist(), strict=True))
-    settings = FairSettings(boundary="fixed", smoothing=0.1, distance_limit=None, closeness_weight=0.0)
+    settings = FairSettings(boundary="fixed", smoothing=config.smoothing, distance_limit=None, closeness_weight=0.0)
     recipe = FairRecipe(vertices, topology, handles=handles, settings=settings)
     hidden = hidden_places(vertices, chosen, config.pull * recipe.unit.length)
     wanted, _ = JobLayer(recipe)({"targets": hidden})

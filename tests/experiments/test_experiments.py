@@ -270,13 +270,13 @@ def test_vertices_slide_until_reflections_are_smoother_without_folding(run: Run,
 
 @pytest.mark.slow
 def test_handles_are_found_through_the_solve(run: Run, tmp_path: Path) -> None:
-    report = run("inverse_design", "--vertices", "60", "--rows", "6", "--steps", "6", "--difference-steps", "1",
-                 "--size", "32", "--points", "4", "--handles", "1", "--pull", "0.4")["designs"]  # fmt: skip
-    for design in report.values():
-        assert design["errors_of_gradients"]["implicit"] < 0.01
-        assert design["errors_of_gradients"]["implicit"] < design["errors_of_gradients"]["unrolled"]
-        assert design["implicit"]["loss"] < 0.7 * design["implicit"]["first_loss"]
-        assert design["implicit"]["solves"] < design["finite differences"]["solves"] * 6
+    design = run("inverse_design", "--vertices", "60", "--steps", "2", "--difference-steps", "1", "--points", "4",
+                 "--handles", "1", "--pull", "0.4")["designs"]["points"]  # fmt: skip
+    errors = design["errors_of_gradients"]
+    assert errors["implicit"] < min(0.01, errors["unrolled"])
+    for way in ("implicit", "unrolled", "finite differences"):
+        assert design[way]["loss"] <= design[way]["first_loss"]
+    assert design["implicit"]["loss"] < design["implicit"]["first_loss"]
     assert load_mesh(tmp_path / "out" / "points_found.obj").topology.is_triangular
 
 
