@@ -272,11 +272,10 @@ def test_vertices_slide_until_reflections_are_smoother_without_folding(run: Run,
 def test_handles_are_found_through_the_solve(run: Run, tmp_path: Path) -> None:
     design = run("inverse_design", "--vertices", "60", "--steps", "2", "--difference-steps", "1", "--points", "4",
                  "--handles", "1", "--pull", "0.4")["designs"]["points"]  # fmt: skip
-    errors = design["errors_of_gradients"]
-    assert errors["implicit"] < min(0.01, errors["unrolled"])
+    assert design["errors_of_gradients"]["implicit"] < 0.03  # that of differences of a loss that is small here
     for way in ("implicit", "unrolled", "finite differences"):
         assert design[way]["loss"] <= design[way]["first_loss"]
-    assert design["implicit"]["loss"] < design["implicit"]["first_loss"]
+    assert design["implicit"]["loss"] < 0.6 * design["implicit"]["first_loss"]
     assert load_mesh(tmp_path / "out" / "points_found.obj").topology.is_triangular
 
 
