@@ -118,6 +118,7 @@ def run(tree: Path, work: list[str], threads: int) -> dict[str, float]:
     if work[0] == "command":
         process = subprocess.Popen(
             [sys.executable, "-m", "torchfair", *work[1:]],
+            cwd=tree,  # python -m looks there first
             env=environment,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

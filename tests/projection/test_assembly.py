@@ -9,7 +9,7 @@ from helpers import DOUBLE, wavy_grid
 from torch import Tensor
 
 from torchfair.linear import ConjugateGradients, DenseQR, RslabDirect, ScipyDirect
-from torchfair.projection import ElementTerm, SmoothAbsolute
+from torchfair.projection import ElementTerm, SmoothAbsolute, portions
 from torchfair.projection.layout import Layout
 from torchfair.projection.linear_system import LinearSystem
 from torchfair.projection.system import Structure
@@ -97,6 +97,29 @@ def test_system_equals_naive_assembly(fix: bool) -> None:
     assert (system.jacobian.to_dense().T @ system.jacobian.to_dense()).allclose(normal, atol=1e-12)
     assert system.jacobian_transpose.to_dense().allclose(system.jacobian.to_dense().T)
     assert float(system.residual_vector.square().sum()) == pytest.approx(float(residual.square().sum()))
+    vectors = torch.sin(torch.arange(2.0 * structure.num_unknowns, dtype=DOUBLE)).view(-1, 2)
+    assert system.product(vectors).allclose(normal @ vectors, atol=1e-12)
+    assert system.product(vectors[:, 0]).allclose(normal @ vectors[:, 0], atol=1e-12)
+
+
+def test_elements_in_portions_are_all_elements(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No element is lost or counted twice where a portion ends."""
+    state, _, _ = mixed_problem()
+    systems = []
+    for size in (10**6, 1):
+        monkeypatch.setattr(portions, "_PORTION", size)
+        with torch.no_grad():
+            structure = mixed_problem(fix=True)[2]
+            at = structure.evaluate(state)
+            systems.append((at, structure.linearise(at)))
+    (whole, one), (apart, other) = systems
+    assert whole.merits.allclose(apart.merits, rtol=1e-14)
+    torch.testing.assert_close(apart.values, whole.values, rtol=1e-13, atol=1e-14)
+    torch.testing.assert_close(other.jacobians, one.jacobians, rtol=1e-13, atol=1e-14)
+    torch.testing.assert_close(other.gradient, one.gradient, rtol=1e-12, atol=1e-13)
+    step = torch.cos(torch.arange(1.0 * one.gradient.shape[0], dtype=DOUBLE))
+    with torch.no_grad():
+        torch.testing.assert_close(other.changes(step), one.changes(step), rtol=1e-12, atol=1e-13)
 
 
 def test_diagonal_blocks_are_those_of_the_normal_matrix() -> None:

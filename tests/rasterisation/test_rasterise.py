@@ -8,6 +8,7 @@ from scipy.spatial import Delaunay
 from torch import Tensor
 
 from torchfair import ShapeError
+from torchfair.rasterisation import scan
 from torchfair.rasterisation.rasterise import interpolate, rasterise, visible_triangles
 from torchfair.rasterisation.scan import triangle_spans
 
@@ -163,3 +164,11 @@ def test_many_small_triangles_span_several_chunks() -> None:
 def test_wrong_shapes_are_named(points: Tensor, triangles: Tensor, size: tuple[int, int], named: str) -> None:
     with pytest.raises(ShapeError, match=named):
         rasterise(points, triangles, *size)
+
+
+def test_triangles_scanned_some_at_a_time_cover_the_same_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, triangles = random_triangles(50, 9.0, 3)
+    whole = triangle_spans(points, triangles, 40, 30)
+    monkeypatch.setattr(scan, "_TRIANGLES", 7)
+    for mine, expected in zip(triangle_spans(points, triangles, 40, 30), whole, strict=True):
+        assert torch.equal(mine, expected)
