@@ -93,3 +93,14 @@ def test_vertices_of_files_that_count_from_0_are_called_so(tmp_path: Path, tube:
     bench = Bench(tmp_path, Open(0, str(tmp_path / "tube.ply"), None, "tube.ply"))
     pull(bench, 30)
     assert shlex.split(told(bench)["text"])[3:5] == ["--handle", "30"]
+
+
+def test_fixed_vertices_are_fixed_in_every_mode(bench: Bench) -> None:
+    document = bench.session.history.now.holding((30,))
+    for mode in ("fair", "form", "symmetric"):
+        moved = replace(document, mode=mode, vertices=document.vertices + 1e-3)
+        words = shlex.split(command_line(moved)[0].splitlines()[-1])
+        assert words[words.index("--fix") + 1] == "31"
+        arguments, unknown = build_parser().parse_known_args(words[1:])
+        assert not unknown
+        assert arguments.fix

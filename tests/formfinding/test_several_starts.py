@@ -193,3 +193,27 @@ def test_the_lifted_formulation_has_one_start() -> None:
     settings = FormSettings(formulation="lifted")
     result = minimise_absolute_curvature(vertices, topology, curves=[rim], starts=4, settings=settings)
     assert not [note for note in result.notes if "starts:" in note]
+
+
+def test_fixed_vertices_stay_and_the_rest_is_formed_around_them() -> None:
+    vertices, topology = start_surface([three_waves()], 170)
+    inner = torch.nonzero(~topology.is_boundary_vertex).squeeze(1)
+    nearest = (vertices[inner] * torch.tensor([1.0, 1.0, 0.0])).norm(dim=1).argsort()[:2]
+    stay = inner[nearest].tolist()
+    free, held = (minimise_absolute_curvature(vertices, topology, fixed=f, levels=1) for f in ((), stay))
+    assert torch.equal(held.levels[0].vertices[stay], vertices[stay])
+    assert not torch.equal(free.levels[0].vertices[stay], vertices[stay])
+    assert f"level 0: {len(stay)} vertices are fixed" in held.notes
+    assert held.after["total_absolute_curvature"] < held.before["total_absolute_curvature"]
+    assert free.after["total_absolute_curvature"] < held.after["total_absolute_curvature"]
+
+
+def test_fixed_vertices_that_cannot_be_are_refused() -> None:
+    vertices, topology = start_surface([three_waves()], 60)
+    with pytest.raises(SettingsError, match="starts must be 1"):
+        minimise_absolute_curvature(vertices, topology, fixed=[3], starts=2)
+    with pytest.raises(MeshError, match="fixed"):
+        minimise_absolute_curvature(vertices, topology, fixed=[len(vertices)])
+    inner = int(torch.nonzero(~topology.is_boundary_vertex)[0])
+    with pytest.raises(MeshError, match="fixed and pulled"):
+        minimise_absolute_curvature(vertices, topology, fixed=[inner], handles={inner: (0.0, 0.0, 0.0)})

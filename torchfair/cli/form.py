@@ -11,7 +11,7 @@ from .arguments import finite, positive_count
 from .chosen_vertices import ChosenVertices
 from .form_inputs import read_form_input
 from .form_mesh import FormOutputs, add_mesh
-from .inputs import add_handles, add_levels, add_repair, read_handles
+from .inputs import add_fixed, add_handles, add_levels, add_repair, read_fixed, read_handles
 from .job_command import JobCommand
 from .pictures import edges_of
 from .request import Request, Writer
@@ -77,6 +77,7 @@ class FormCommand(JobCommand):
         add_levels(parser)
         add_mesh(parser)
         add_handles(parser)
+        add_fixed(parser)
         add_repair(parser)
 
     def outputs(self, arguments: argparse.Namespace) -> FormOutputs:
@@ -87,13 +88,15 @@ class FormCommand(JobCommand):
         """See the base class."""
         start = read_form_input(arguments, settings.corner_angle)
         chosen = ChosenVertices(start.mesh, start.notes)
+        fixed, alone = read_fixed(arguments, chosen), arguments.input is None
         options = {
             "curves": start.curves or None,
             "normals": start.normals,
             "handles": read_handles(arguments, chosen) | start.nearest(arguments.through),
+            "fixed": fixed,
             "levels": arguments.levels,
-            "remesh": arguments.remesh or arguments.input is None,
-            "starts": arguments.starts or (_STARTS if arguments.input is None else 1),
+            "remesh": arguments.remesh or alone,
+            "starts": arguments.starts or (_STARTS if alone and not fixed else 1),
         }
         return Request(start.mesh, options, notes=start.notes)
 

@@ -36,7 +36,7 @@ def command_line(document: Document) -> tuple[str, bool, str]:
         return "\n".join(lines), False, _ROUGHLY
     command, *options = _words(job)
     lines.append(_line(["torchfair", command, source, *options, *repair, "-o", "result.obj"]))
-    exact = len(lines) == 1 and not job["levels"] and not (document.held and document.mode == "form")
+    exact = len(lines) == 1 and not job["levels"]
     return "\n".join(lines), exact, _EXACT if exact else _ROUGHLY
 
 
@@ -68,7 +68,7 @@ def _words(step: Mapping[str, Any]) -> list[str]:
     words = [kind]
     for vertex, *place in step["handles"]:
         words += ["--handle", str(vertex), *map(repr, place)]
-    if step["held"] and kind != "form":
+    if step["held"]:
         words += ["--fix", *map(str, step["held"])]
     for name, value in step["weights"].items():
         words += [f"--{_OPTIONS.get(name, name.replace('_', '-'))}", repr(float(value))]

@@ -8,12 +8,11 @@ from dataclasses import replace
 
 from torch import Tensor
 
-from ...errors import MeshError, SettingsError
+from ...errors import SettingsError
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ...settings.fair_settings import FairSettings
 from ...topology import Topology
-from ..handles import vertex_numbers
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference, refuse_far_reference
 from .feature_curves import FeatureCurves
@@ -71,19 +70,8 @@ class FairRecipe(Recipe[FairSettings]):
             near_input=near_input,
         )
         self.notes = self.problem.notes
-        self._fix(fixed, handles or {})
+        self.fix(fixed, handles or {})
         self.pull(handles or {})
-
-    def _fix(self, fixed: Iterable[int], handles: Iterable[int]) -> None:
-        """Holds vertices where they are; MeshError for what is no vertex, or is pulled."""
-        chosen = sorted(set(fixed))
-        numbers = vertex_numbers(chosen, self.topology, "fixed: ")
-        both = sorted(set(chosen) & set(handles))
-        if both:
-            raise MeshError(f"vertices cannot be fixed and pulled at once: {both[:5]}")
-        if chosen:
-            self.pulls.hold(numbers)
-            self.notes.append(f"{len(numbers)} vertices are fixed")
 
     def take_settings(self, settings: FairSettings) -> None:
         """Takes other weights."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import torch
 from torch import Tensor
@@ -34,7 +34,7 @@ class FormRecipe(Recipe[FormSettings]):
 
     Args:
         vertices, topology, curves, normals, settings: See :func:`minimise_absolute_curvature`.
-        handles: Likewise; more of them may be pulled later.
+        handles, fixed: Likewise; more of them may be pulled or held later.
         rim: Curves and normals of a coarser mesh, carried on to its refinement, instead of ``curves`` and ``normals``;
             the vertices are then taken to be near the solution.
         starts, remesh: See :func:`minimise_absolute_curvature`.
@@ -57,6 +57,7 @@ class FormRecipe(Recipe[FormSettings]):
         rim: Rim | None = None,
         starts: int = 1,
         remesh: bool = False,
+        fixed: Iterable[int] = (),
     ) -> None:
         super().__init__(vertices, topology, settings or FormSettings())
         check_rim(self.given, self.topology, curves)
@@ -70,6 +71,7 @@ class FormRecipe(Recipe[FormSettings]):
             triangles = Topology.from_faces(triangulate(self.given, topology).triangles, topology.num_vertices)
         self.problem = FormProblem(triangles, self.unit, self.rim, self.pulls, self.settings)
         self._follower = FormFollower(self.problem)
+        self.fix(fixed, handles or {})
         self.pull(handles or {})
 
     def take_settings(self, settings: FormSettings) -> None:
@@ -213,6 +215,7 @@ def minimise_absolute_curvature(
     curves: Sequence[ClosedCurve] | None = None,
     normals: Tensor | None = None,
     handles: Mapping[int, Sequence[float]] | None = None,
+    fixed: Iterable[int] = (),
     levels: int = 0,
     starts: int = 1,
     remesh: bool = False,
@@ -245,6 +248,7 @@ def minimise_absolute_curvature(
         normals: (V, 3) prescribed normals of the surface at boundary vertices, of any length; zero where none is.
             They point to the side from which faces run counterclockwise.
         handles: Places to pass through, by vertex number.
+        fixed: Numbers of vertices that stay where they are.
         levels: How often to refine.
         starts: From how many surfaces to start, the given one first: others have its boundary and connectivity and lie
             on its convex hull, above and below, are bumped up and down, of least area, or have random bumps. The best
@@ -264,14 +268,10 @@ def minimise_absolute_curvature(
     Raises:
         ShapeError: vertices or normals are not ``(V, 3)``, or a handle is not a point.
         MeshError: vertices are not finite, a face has no area, the mesh is closed, curves cross or do not fit the
-            boundary, or a handle is no vertex or pulls a vertex of the boundary that stays.
-        SettingsError: ``starts`` is below 1, or ``remesh`` is asked for a mesh that has other faces than triangles.
-
-    Example::
-
-        vertices, topology = start_surface([curve], 500)
-        result = minimise_absolute_curvature(vertices, topology, curves=[curve], levels=1)
-        print(result.after["total_absolute_curvature"], result.holds)
+            boundary, a handle is no vertex or pulls a vertex of the boundary that stays, or a fixed vertex is none or
+            pulled.
+        SettingsError: ``starts`` is below 1, or above 1 with fixed vertices, which others would not hold, or ``remesh``
+            is asked for a mesh that has other faces than triangles.
 
     Example:
         >>> import math
@@ -287,13 +287,18 @@ def minimise_absolute_curvature(
     """
     if starts < 1:
         raise SettingsError(f"starts must be at least 1, got {starts}")
+    stay = list(fixed)
+    if stay and starts > 1:
+        raise SettingsError(
+            f"fixed vertices stay on the surface that is given: starts must be 1 with them, got {starts}"
+        )
     if remesh and not topology.is_triangular:
         raise SettingsError("remesh replaces triangles, and the mesh has other faces: cut these, or leave remesh out")
 
     def begin() -> FormRecipe:
         return FormRecipe(
             vertices, topology, curves=curves, normals=normals, handles=handles, settings=settings, starts=starts,
-            remesh=remesh,
+            remesh=remesh, fixed=stay,
         )  # fmt: skip
 
     return solved(begin, vertices, levels=levels, callback=callback)

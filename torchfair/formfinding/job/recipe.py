@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import ClassVar, Generic, Protocol, TypeVar
 
 import torch
@@ -15,7 +15,7 @@ from ...projection import ElementTerm, ProjectionResult, ProjectionSettings
 from ...projection.layout import State
 from ...topology import Topology
 from ..checks import one_start, refuse_degenerate_faces
-from ..handles import read_handles
+from ..handles import read_handles, vertex_numbers
 from .plan import OneStage, Plan, Stage, at_rest
 from .promises import Promise
 from .pulls import Pulls
@@ -162,6 +162,21 @@ class Recipe(ABC, Generic[S]):
         self.pulls.version += 1
 
     # ---- handles ---------------------------------------------------------------------------------------
+
+    def fix(self, fixed: Iterable[int], handles: Iterable[int]) -> None:
+        """Holds vertices of the start where they are.
+
+        Raises:
+            MeshError: one is no vertex, or is pulled.
+        """
+        chosen = sorted(set(fixed))
+        numbers = vertex_numbers(chosen, self.topology, "fixed: ")
+        both = sorted(set(chosen) & set(handles))
+        if both:
+            raise MeshError(f"vertices cannot be fixed and pulled at once: {both[:5]}")
+        if chosen:
+            self.pulls.hold(numbers)
+            self.notes.append(f"{len(numbers)} vertices are fixed")
 
     def pull(self, places: Mapping[int, Sequence[float]]) -> None:
         """Pulls vertices to places in the unit of the input.
