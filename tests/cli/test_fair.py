@@ -257,7 +257,8 @@ def test_fixed_vertices_stay_where_they_are(
         expected = {int((before - place).norm(dim=1).argmin())}
     chosen = sorted(expected)
     assert torch.equal(before[chosen], after[chosen])
-    assert f"{len(chosen)} vertices are fixed" in capsys.readouterr().out
+    told = "1 vertex is fixed" if len(chosen) == 1 else f"{len(chosen)} vertices are fixed"
+    assert told in capsys.readouterr().out
     assert report_in(output.parent)["request"]["fix"] == [" ".join(words)]
 
 

@@ -176,7 +176,7 @@ class Recipe(ABC, Generic[S]):
             raise MeshError(f"vertices cannot be fixed and pulled at once: {both[:5]}")
         if chosen:
             self.pulls.hold(numbers)
-            self.notes.append(f"{len(numbers)} vertices are fixed")
+            self.notes.append(f"{len(numbers)} vertices are fixed" if len(numbers) > 1 else "1 vertex is fixed")
 
     def pull(self, places: Mapping[int, Sequence[float]]) -> None:
         """Pulls vertices to places in the unit of the input.
