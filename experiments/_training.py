@@ -188,7 +188,7 @@ class _Run:
         self.optimiser.zero_grad(set_to_none=True)
         with self.config.autocast():
             values = self.terms()
-        values["loss"].backward()  # type: ignore[no-untyped-call]
+        values["loss"].backward()
         self.processes.average_gradients(self.model)
         if self.config.clip:
             nn.utils.clip_grad_norm_(self.model.parameters(), self.config.clip)

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from _charts import BLUE, GREEN, ORANGE, add_chart, add_legend
@@ -163,11 +164,12 @@ class Search:
 
     def __init__(self, design: Design, way: str, config: Config) -> None:
         self.design, self.way, self.step = design, way, config.difference
-        backward = "unroll" if way == UNROLLED else "implicit"
+        backward: Literal["implicit", "unroll"] = "unroll" if way == UNROLLED else "implicit"
         self.layer = JobLayer(design.recipe, backward=backward, tolerance=config.tolerance)
         self.targets = design.recipe.given[torch.tensor(list(design.recipe.handles))]
         self.mesh, _ = self.layer({"targets": self.targets})
-        self.best, self.history, self.seconds = math.inf, [], time.process_time()
+        self.best, self.seconds = math.inf, time.process_time()
+        self.history: list[dict[str, float]] = []
         self.solves, self.faults, self.unit = 0, 0, design.recipe.unit.length
         self.last_fault = ""
 
@@ -186,6 +188,7 @@ class Search:
     def finished(self, at: Tensor, start: Tensor) -> Tensor:
         self.solves += 1
         mesh, info = self.layer({"targets": self.targets + self.unit * at}, start=start)
+        assert not isinstance(info, list), "there is no batch"
         if info.point.fault:
             raise DerivativeError(info.point.fault)
         return mesh

@@ -188,7 +188,7 @@ def compare(model: FormFinder, square: Square, config: Config) -> tuple[Report, 
         begin = time.process_time()
         found = model(heights.to(**config.place)).double()
         seconds = (time.process_time() - begin) / config.unseen
-    rows, first = [], {}
+    rows, first = [], dict[str, Tensor]()
     for number, rim in enumerate(heights):
         start = square.harmonic_surface(rim)
         cold, cold_course, cold_seconds = solve(start, square)
@@ -196,7 +196,7 @@ def compare(model: FormFinder, square: Square, config: Config) -> tuple[Report, 
         surfaces = {"harmonic": start, "network": found[number], "solver": cold, "solver, warm": warm}
         values = {name: float(curvature(vertices)) for name, vertices in surfaces.items()}
         goal = 1.01 * values["solver"]
-        row = {**values, "cold_seconds": cold_seconds, "warm_seconds": warm_seconds}
+        row: dict[str, Any] = {**values, "cold_seconds": cold_seconds, "warm_seconds": warm_seconds}
         row |= {"cold_steps": steps_until(goal, cold_course), "warm_steps": steps_until(goal, warm_course)}
         rows.append(row)
         first = first or {name: surfaces[name] for name in SURFACES}
