@@ -56,11 +56,6 @@ class EdgeDirections(Constraint):
         topology: Any polygon mesh.
         edges: (n,) numbers of interior edges, by default all.
 
-    Example::
-
-        keeps = EdgeDirections(vertices, topology)
-        loss = NormalVariation(topology)(moved) + 30.0 * keeps(moved)
-
     Example:
         >>> import torch
         >>> from torchfair.constraints import EdgeDirections

@@ -42,10 +42,6 @@ def noise_level(vertices: Tensor, topology: Topology, near: Neighbourhoods | Non
     Raises:
         MeshError: no neighbourhood is large enough.
 
-    Example::
-
-        sigma = noise_level(vertices, topology)
-
     Example:
         >>> import torch
         >>> from torchfair.formfinding import noise_level

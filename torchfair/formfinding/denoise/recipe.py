@@ -92,11 +92,6 @@ def denoise(
         ShapeError: vertices are not ``(V, 3)``.
         MeshError: vertices are not finite, a face has no area, or the mesh is too small to estimate its noise.
 
-    Example::
-
-        result = denoise(vertices, topology)
-        print(result.after["noise"], result.after["flipped_faces"], result.seconds)
-
     Example:
         >>> import torch
         >>> from torchfair.formfinding import denoise

@@ -206,11 +206,6 @@ def minimise_normal_variation(
         MeshError: vertices are not finite, a face has no area, a handle or a fixed vertex is none or one is both, or
             the reference is farther away than ``settings.reference_distance``.
 
-    Example::
-
-        result = minimise_normal_variation(vertices, topology)
-        print(result.before["normal_variation"], result.after["normal_variation"], result.holds)
-
     Example:
         >>> from torchfair.formfinding import minimise_normal_variation
         >>> from torchfair.shapes import Catenoid, irregular_triangles

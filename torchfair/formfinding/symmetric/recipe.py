@@ -257,11 +257,6 @@ def principal_symmetric(
         MeshError: vertices are not finite, a face has no area, a handle is no vertex or fixed, or no condition can be
             imposed.
 
-    Example::
-
-        result = principal_symmetric(vertices, principal, handles={17: (0.1, 0.0, 0.4)}, levels=1)
-        print(result.vertices, result.levels[-1].principal, result.holds)
-
     Example:
         >>> from torchfair.formfinding import principal_symmetric
         >>> from torchfair.principal import principal_edges_of_lattice
