@@ -134,7 +134,8 @@ class Topology(MeshTables):
             MeshError: if there is anything else among them, or they are on several devices.
 
         Example:
-            >>> from torchfair import NormalVariation
+            >>> import torch
+            >>> from torchfair import NormalVariation, Topology
             >>> from torchfair.shapes import icosphere
             >>> meshes = [icosphere(1), icosphere(2)]
             >>> energy = NormalVariation(Topology.join(m.topology for m in meshes))

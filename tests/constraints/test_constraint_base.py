@@ -217,7 +217,7 @@ def test_feet_on_curves_keep_no_graph() -> None:
         SplineCurves([VERTICES[:5]], [False]), torch.arange(5), torch.zeros(5, dtype=torch.int64)
     )
     assert not feet({"vertices": moved(VERTICES).requires_grad_()}).positions.requires_grad
-    assert feet._asked is None
+    assert feet._kept == []
     state = {"vertices": moved(VERTICES)}
     assert feet(state) is feet(state)
 

@@ -290,7 +290,7 @@ def test_second_derivatives_are_refused() -> None:
 
 def test_faults_name_what_is_in_the_way() -> None:
     """A coarse mesh that slides on its own facets has kinks: no minimum after a few steps."""
-    mesh = irregular_triangles(Enneper(), 40)
+    mesh = irregular_triangles(Enneper(), 90)
     recipe = FairRecipe(mesh.vertices, mesh.topology, settings=FIXED)
     weight = number(0.3).requires_grad_()
     finished, info = JobLayer(recipe, steps=2)()

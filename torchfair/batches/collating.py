@@ -24,6 +24,7 @@ def collate(samples: Sequence[Any]) -> Any:
         ShapeError: if vertices do not go together.
 
     Example:
+        >>> from torchfair.batches import collate
         >>> from torchfair.shapes import icosphere
         >>> samples = [{"mesh": icosphere(1), "label": 3}, {"mesh": icosphere(2), "label": 5}]
         >>> batch = collate(samples)

@@ -46,6 +46,7 @@ class MeshBatch:
 
     Example:
         >>> from torchfair import NormalVariation
+        >>> from torchfair.batches import MeshBatch
         >>> from torchfair.shapes import icosphere
         >>> batch = MeshBatch.of([icosphere(1), icosphere(2)])
         >>> NormalVariation(batch.topology)(batch.vertices).shape

@@ -33,6 +33,10 @@ def from_compas(mesh: Any, *, manifold: Manifold = "vertices") -> tuple[Tensor, 
 def as_compas(vertices: Tensor, topology: Topology) -> dict[str, Any]:
     """Arguments of ``Mesh.from_vertices_and_faces(**as_compas(vertices, topology))`` for one mesh of any polygons.
 
+    Args:
+        vertices: (V, 3), any length unit.
+        topology: of the mesh.
+
     Raises:
         ShapeError: if ``vertices`` do not fit.
     """

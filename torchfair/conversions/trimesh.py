@@ -31,6 +31,10 @@ def from_trimesh(mesh: Any, *, manifold: Manifold = "vertices") -> tuple[Tensor,
 def as_trimesh(vertices: Tensor, topology: Topology) -> dict[str, Any]:
     """Arguments of ``Trimesh`` for one mesh: ``Trimesh(**as_trimesh(vertices, topology))``; nothing is welded.
 
+    Args:
+        vertices: (V, 3), any length unit.
+        topology: of the mesh.
+
     Raises:
         MeshError: if a face is not a triangle.
         ShapeError: if ``vertices`` do not fit.

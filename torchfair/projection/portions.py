@@ -45,9 +45,11 @@ class Arguments(Sequence[Tensor]):
 
 
 def portions(count: int, like: Tensor) -> list[slice]:
-    """Elements to be worked on at once; all of them while derivatives are recorded, and on other devices than CPUs."""
+    """Elements to be worked on at once; all of them while anything is recorded, and on other devices than CPUs."""
+    if torch.compiler.is_compiling() or torch.is_grad_enabled() or not like.is_cpu:
+        return [slice(None)]
     size = _PORTION * torch.get_num_threads()
-    if count <= 2 * size or torch.is_grad_enabled() or not like.is_cpu:
+    if count <= 2 * size:
         return [slice(None)]
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
