@@ -15,7 +15,9 @@ import torchfair
 from torchfair.constraints import Constraint
 from torchfair.energies import MeshModule
 
-FIRST = r"n\+1|\*batch|\.\.\.|\d*[A-Z]\w*'?(?: ?[+*-] ?\w+)?(?: of the file)?|[a-z]|\d+|channels|size|height|views|blocks"
+FIRST = (
+    r"\*batch|\.\.\.|\d*[A-Z]\w*'?(?: ?[+*-] ?\w+)?(?: of the file)?|n\+1|[a-z]|\d+|channels|size|height|views|blocks"
+)
 SHAPE = re.compile(rf"\((?:\.\.\.|(?:{FIRST}) ?,[^()]*)\)|any shape|one number")
 TENSOR = re.compile(r"(?:torch\.)?Tensor(?: \| None)?")
 TEMPLATES = {"like"}  # tensors of which only dtype and device count

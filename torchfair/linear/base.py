@@ -95,7 +95,7 @@ class Descending(Protocol):
     """
 
     def descend(self, right: Tensor, accuracy: float) -> Solution:
-        """As :meth:`Factor.solve` for ``right`` (N,) or (N, k), to an end also where the quadratic hardly falls any more."""
+        """As :meth:`Factor.solve`, ``right`` (N,) or (N, k), but ends where the quadratic hardly falls any more."""
         ...
 
 
