@@ -221,3 +221,16 @@ def test_the_title_of_a_bar_stays_beside_the_pictures(label: str) -> None:
     assert inked.min() >= 800 - MARGIN - BAR
     assert inked.max() < 800
     assert inked.min() < 800 - MARGIN - BAR + 44 + 13, "it has a title"
+
+
+def test_long_captions_fit_beside_each_other() -> None:
+    sheet = Sheet(900, 200)
+    for column, words in enumerate(
+        ["short", "a caption that is much too long for a third of the page, $C$ = 8.07", "W" * 60]
+    ):
+        sheet.caption(words, 300 * column, 0, 300)
+    ends = [text.get_window_extent() for text in sheet.figure.texts]
+    for column, end in enumerate(ends):
+        assert end.x0 >= 300 * column - 1
+        assert end.x1 <= 300 * (column + 1) + 1
+    assert sheet.figure.texts[0].get_fontsize() > 1.2 * sheet.figure.texts[1].get_fontsize()

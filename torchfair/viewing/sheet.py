@@ -69,8 +69,10 @@ class Sheet:
         self._labels.append((words, x, y, size))
 
     def caption(self, words: str, left: float, top: float, width: float) -> None:
-        """Words in the middle of a line of captions."""
+        """Words in the middle of a line of captions, smaller where they would not fit into the width."""
         self.text(words, left + width / 2, top + CAPTION / 2, 26, ha="center", va="center")
+        written = self.figure.texts[-1]
+        written.set_fontsize(written.get_fontsize() * min(1.0, width / written.get_window_extent().width))
 
     def note(self, words: str, left: float, top: float) -> None:
         """Small faint words at the left of a line of captions."""
