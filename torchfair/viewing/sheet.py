@@ -72,7 +72,8 @@ class Sheet:
         """Words in the middle of a line of captions, smaller where they would not fit into the width."""
         self.text(words, left + width / 2, top + CAPTION / 2, 26, ha="center", va="center")
         written = self.figure.texts[-1]
-        written.set_fontsize(written.get_fontsize() * min(1.0, width / written.get_window_extent().width))
+        share = width / max(written.get_window_extent().width, 1.0)
+        written.set_fontsize(float(written.get_fontsize()) * min(1.0, share))
 
     def note(self, words: str, left: float, top: float) -> None:
         """Small faint words at the left of a line of captions."""
