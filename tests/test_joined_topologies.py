@@ -177,6 +177,7 @@ def test_under_transforms(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["E", "E, weighted", "C", "umbrella", "polylines", "pyramids", "reflection variation"])
 def test_compiles_to_one_graph(name: str) -> None:
+    torch._dynamo.reset()
     loss = LOSSES[name](JOINED)
     compiled = torch.compile(loss, backend="aot_eager", fullgraph=True)
     torch.testing.assert_close(compiled(VERTICES), loss(VERTICES))

@@ -13,11 +13,12 @@ from design_tools import Bench, failures
 from hostile_messages import texts
 
 from torchfair import Topology, load_mesh
-from torchfair.design.commands import CommandRefused, read_command
+from torchfair.design.commands import CommandRefused, checked_command, read_command
 from torchfair.design.containers import AT_REST, DRAGGING, JUMP
 from torchfair.design.effects import Ask, Autosave, Deliver, Tell, Wake
 from torchfair.design.engine import requests as r
 from torchfair.design.engine import saying as say
+from torchfair.design.engine.follower import Follower
 from torchfair.design.states import DesignState
 from torchfair.energies import normal_variation
 from torchfair.formfinding import condition_residuals
@@ -173,6 +174,22 @@ def test_fixed_vertices_stay_and_freed_ones_go(bench: Bench) -> None:
     assert bench.session.history.now.held == ()
     assert not np.array_equal(bench.vertices[near], before[near])
     assert last(bench, "handles")["held"] == []
+
+
+def test_a_flick_of_the_mouse_ends_where_it_was_let_go(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The release comes while the first step of the move is made."""
+    place, step = pulled(bench, outwards=0.8), Follower.step
+
+    def released(follower: Follower) -> object:
+        done = step(follower)
+        bench.carry_out(bench.session.command(1, checked_command({"type": "release", "id": 1})))
+        return done
+
+    monkeypatch.setattr(Follower, "step", released)
+    bench.say(type="move", places=[[HANDLE, *place]], count=1)
+    assert not bench.errors
+    assert bench.session.state is S.READY
+    assert np.abs(bench.vertices[HANDLE] - place).max() < 0.02
 
 
 def test_weights_act_while_they_are_turned(bench: Bench) -> None:

@@ -13,7 +13,14 @@ from torch import Tensor
 
 from torchfair import MeshError, ShapeError, Topology
 from torchfair.errors import SettingsError
-from torchfair.formfinding import DenoiseRecipe, FairRecipe, FairSettings, Session, minimise_normal_variation
+from torchfair.formfinding import (
+    DenoiseRecipe,
+    FairRecipe,
+    FairSettings,
+    FormRecipe,
+    Session,
+    minimise_normal_variation,
+)
 from torchfair.projection import IterationRecord
 from torchfair.shapes import Torus, principal_triangles
 
@@ -48,6 +55,18 @@ def drag(session: Session[FairRecipe], moves: int = 4, start: float = 0.0) -> li
         assert session.step().accepted
         lags.append(float((session.vertices[MIDDLE] - torch.tensor(place)).norm()) / session.recipe.unit.length)
     return lags
+
+
+@pytest.mark.parametrize("recipe", [FairRecipe, FormRecipe])
+@pytest.mark.parametrize("height", [1.0, 3.0])
+def test_a_handle_that_is_let_go_far_away_goes_all_the_way(recipe: type[FairRecipe], height: float) -> None:
+    """A live step pulls by half an edge at most, and the rest was forgotten when the mesh came to rest after it."""
+    session = Session(recipe(*sheet()))
+    place = above(session, height)
+    session.move({MIDDLE: place})
+    assert session.step().accepted
+    assert not session.settle()
+    assert float((session.vertices[MIDDLE] - torch.tensor(place)).norm()) < 0.05 * session.recipe.unit.length
 
 
 def test_a_handle_that_is_dragged_is_followed_step_by_step() -> None:

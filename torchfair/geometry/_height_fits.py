@@ -78,7 +78,7 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     if degree <= 2:
         covariance = patches.in_order([fit.covariance for fit in fits])
         return Heights(frames, scale, coefficients, covariance.view(*scale.shape, *least.shape))
-    del fits
+    fits.clear()
     variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
     believed = []
     for group in patches.groups:

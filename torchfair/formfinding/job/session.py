@@ -213,10 +213,14 @@ class Session(Generic[R]):
         return self._following
 
     def settle(self) -> bool:
-        """Brings the mesh to rest, with the damping of the last live step; whether someone stopped it."""
+        """Brings the mesh to rest, with the damping of the last live step; whether someone stopped it.
+
+        Handles that live steps have not caught up with go all the way.
+        """
         damping = None if self._following is None else self._following.state.damping
 
         def plan(state: State) -> Plan:
+            self.recipe.pulls.aim(1.0, self.recipe.placed(state))
             return self.recipe.settling(state, damping)
 
         return self._edited(plan)
