@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
@@ -85,6 +87,13 @@ def row(*parts: tuple[str, tuple[float, float, float, float]], inch: float = 0.6
         panels.append(Panel(axes))
         start += width + gap
     return figure, panels
+
+
+def write_all(drawings: Sequence[Callable[[], Figure]], images: Path) -> None:
+    """Writes drawings by their names into a folder, or as PNG into that named on the command line."""
+    for draw in drawings:
+        path = Path(sys.argv[1], draw.__name__ + ".png") if len(sys.argv) > 1 else images / f"{draw.__name__}.svg"
+        save(draw(), path)
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -7,12 +7,26 @@ from __future__ import annotations
 
 import itertools
 import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from drawing_tools import BLUE, FAINT, GREEN, INK, LEFT, RED, RIGHT, SPOT, Panel, mean_of, polar, ring_of, row, save
+from drawing_tools import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    LEFT,
+    RED,
+    RIGHT,
+    SPOT,
+    Panel,
+    mean_of,
+    polar,
+    ring_of,
+    row,
+    write_all,
+)
 from matplotlib.figure import Figure
 
 IMAGES = Path(__file__).resolve().parent / "images"
@@ -340,12 +354,5 @@ DRAWINGS: list[Callable[[], Figure]] = [
 ]
 
 
-def main() -> None:
-    """Writes all drawings."""
-    for draw in DRAWINGS:
-        path = Path(sys.argv[1], draw.__name__ + ".png") if len(sys.argv) > 1 else IMAGES / f"{draw.__name__}.svg"
-        save(draw(), path)
-
-
 if __name__ == "__main__":
-    main()
+    write_all(DRAWINGS, IMAGES)

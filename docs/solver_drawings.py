@@ -7,12 +7,11 @@ there.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from drawing_tools import BLUE, FAINT, GREEN, INK, RED, mean_of, polar, ring_of, row, save
+from drawing_tools import BLUE, FAINT, GREEN, INK, RED, mean_of, polar, ring_of, row, write_all
 from matplotlib.figure import Figure
 
 IMAGES = Path(__file__).resolve().parent / "images"
@@ -114,12 +113,5 @@ def inequality() -> Figure:
 DRAWINGS: list[Callable[[], Figure]] = [constraints, reweighting, inequality]
 
 
-def main() -> None:
-    """Writes all drawings."""
-    for draw in DRAWINGS:
-        path = Path(sys.argv[1], draw.__name__ + ".png") if len(sys.argv) > 1 else IMAGES / f"{draw.__name__}.svg"
-        save(draw(), path)
-
-
 if __name__ == "__main__":
-    main()
+    write_all(DRAWINGS, IMAGES)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from torch import Tensor
 from torch.utils.data import default_collate
 
 from ..topology import Topology
-from .mesh_batch import MeshBatch
+from .mesh_batch import MeshBatch, taken_apart
 
 
 def collate(samples: Sequence[Any]) -> Any:
@@ -36,7 +35,7 @@ def collate(samples: Sequence[Any]) -> Any:
         return MeshBatch.of(mesh for batch in samples for mesh in batch)
     if isinstance(first, Topology):
         return Topology.join(samples)
-    if _is_mesh(first):
+    if not isinstance(first, list) and taken_apart(first) is not None:
         return MeshBatch.of(samples)
     if isinstance(first, Mapping):
         return {key: collate([sample[key] for sample in samples]) for key in first}
@@ -45,11 +44,3 @@ def collate(samples: Sequence[Any]) -> Any:
     if isinstance(first, tuple | list):
         return [collate(column) for column in zip(*samples, strict=True)]
     return default_collate(list(samples))
-
-
-def _is_mesh(sample: object) -> bool:
-    if isinstance(sample, tuple) and len(sample) == 2:
-        vertices, topology = sample
-    else:
-        vertices, topology = getattr(sample, "vertices", None), getattr(sample, "topology", None)
-    return isinstance(vertices, Tensor) and isinstance(topology, Topology)

@@ -197,17 +197,23 @@ def _places(meshes: Tensor, count: int) -> Tensor:
     return torch.arange(meshes.shape[0], device=meshes.device) - (sizes.cumsum(0) - sizes)[meshes]
 
 
-def _pair(mesh: object, number: int) -> tuple[Tensor, Topology]:
+def taken_apart(mesh: object) -> tuple[Tensor, Topology] | None:
+    """Vertices and topology of a pair of both, or of an object that has them; None of anything else."""
     if isinstance(mesh, Sequence) and len(mesh) == 2:
         vertices, topology = mesh
     else:
         vertices, topology = getattr(mesh, "vertices", None), getattr(mesh, "topology", None)
-    if not isinstance(vertices, Tensor) or not isinstance(topology, Topology):
+    return (vertices, topology) if isinstance(vertices, Tensor) and isinstance(topology, Topology) else None
+
+
+def _pair(mesh: object, number: int) -> tuple[Tensor, Topology]:
+    pair = taken_apart(mesh)
+    if pair is None:
         raise MeshError(
             f"mesh {number} is neither a pair (vertices, topology) nor has attributes of these names: "
             f"{type(mesh).__name__}"
         )
-    return vertices, topology
+    return pair
 
 
 def _check(vertices: Tensor, topology: Topology, first: Tensor, number: int) -> None:

@@ -17,7 +17,7 @@ from ..errors import MeshFileError
 from .dxf_frame import UNITS, framed
 from .dxf_tags import Tags, count_of, entities, floats_of, header_value, integer_of, integers_of, tags_of
 from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
-from .rhino_parts import UNITLESS, RhinoParts
+from .rhino_parts import UNITLESS, RhinoParts, kinds_listed, one_object, single_objects
 
 _POLYFACE, _PLACE, _RECORD = 64, 64, 128  # flags of POLYLINE, and of VERTEX: with a position, of a polyface mesh
 _CORNERS = (71, 72, 73, 74)
@@ -40,7 +40,7 @@ def read_dxf(path: Path, data: bytes) -> RawMesh:
     tags = tags_of(path, data)
     others: Counter[str] = Counter()
     found = list(_meshes(path, tags, others))
-    listed = ": " + ", ".join(f"{n} {kind}" for kind, n in sorted(others.items())) if others else ""
+    listed = kinds_listed(others)
     if not found:
         raise MeshFileError(path, f"has no MESH and no polyface mesh in its model space{listed}")
     counts = [len(mesh.points) for mesh in found]
@@ -61,17 +61,8 @@ def read_dxf(path: Path, data: bytes) -> RawMesh:
 
 def write_dxf(mesh: RawMesh, parts: RhinoParts | None = None) -> bytes:
     """The bytes of a DXF file (AutoCAD 2010), one MESH for each object; its digits read back to the same float64."""
-    parts = parts or RhinoParts(UNITLESS, (("", ""),), np.zeros(len(mesh.offsets) - 1, np.int64))
-    found = []
-    for number, (_, layer) in enumerate(parts.objects):
-        chosen = np.flatnonzero(parts.owners == number)
-        if not chosen.size:
-            continue
-        faces = [mesh.corners[mesh.offsets[f] : mesh.offsets[f + 1]] for f in chosen.tolist()]
-        whole = len(chosen) == len(mesh.offsets) - 1
-        used = np.arange(len(mesh.points)) if whole else np.unique(np.concatenate(faces))
-        found.append((layer, _body(mesh.points[used], [np.searchsorted(used, face) for face in faces])))
-    return framed(found, parts.unit)
+    parts = parts or one_object(mesh)
+    return framed([(one.layer, _body(one.points, one.faces)) for one in single_objects(mesh, parts)], parts.unit)
 
 
 def _body(points: Floats, faces: list[Ints]) -> str:

@@ -20,8 +20,8 @@ from .._names import first_few
 from ..errors import MeshFileError, TorchfairError
 from ..topology import Topology
 from ..triangulation import triangulate
-from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
-from .rhino_parts import UNITLESS, RhinoParts
+from .raw_mesh import Floats, Origin, RawMesh, assemble
+from .rhino_parts import RhinoParts, SingleObject, kinds_listed, one_object, single_objects
 from .rhino_surfaces import Cells, Patch, patches_of, sampled
 
 _NGONS = "torchfair ngons"
@@ -96,13 +96,13 @@ def read_rhino(path: Path, data: bytes, surfaces: Cells | None = None) -> RawMes
             f"{first_few(trimmed, len(trimmed))}. Hide them, or mesh them in Rhino")  # fmt: skip
     if not points:
         way = f", or sample them: {_SAMPLE}" if patches else ""
-        raise MeshFileError(path, f"has no visible meshes{_listed(others)}. Mesh its surfaces in Rhino first{way}")
+        raise MeshFileError(path, f"has no visible meshes{kinds_listed(others)}. Mesh its surfaces in Rhino first{way}")
     sizes = np.array([len(face) for face in faces], np.int64)
     corners = np.array([v for face in faces for v in face], np.int64)
     raw = assemble(Origin(path), np.concatenate(points), corners, sizes)
     attributes = RhinoParts(model.Settings.ModelUnitSystem.name, tuple(objects), np.array(owners, np.int64))
     way = f". Surfaces are sampled by {_SAMPLE}" if patches else ""
-    notes = [f"left out of the file{_listed(others)}{way}"] if others else []
+    notes = [f"left out of the file{kinds_listed(others)}{way}"] if others else []
     return raw._replace(attributes=attributes, notes=tuple(notes))
 
 
@@ -113,19 +113,16 @@ def write_rhino(mesh: RawMesh, parts: RhinoParts | None = None) -> bytes:
         TorchfairError: rhino3dm is not installed, or refuses to write.
     """
     rhino = rhino_package()
-    parts = parts or RhinoParts(UNITLESS, (("", ""),), np.zeros(len(mesh.offsets) - 1, np.int64))
+    parts = parts or one_object(mesh)
     model = rhino.File3dm()
     model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, parts.unit)
     layers: dict[str, int] = {}
-    for number, (name, layer) in enumerate(parts.objects):
-        chosen = np.flatnonzero(parts.owners == number)
-        if not chosen.size:
-            continue
-        made, table = _made(rhino, mesh, chosen)
+    for one in single_objects(mesh, parts):
+        made, table = _made(rhino, one)
         attributes = rhino.ObjectAttributes()
-        attributes.Name = name
-        if layer:
-            attributes.LayerIndex = _layer(rhino, model, layer, layers)
+        attributes.Name = one.name
+        if one.layer:
+            attributes.LayerIndex = _layer(rhino, model, one.layer, layers)
         if table:
             attributes.SetUserString(_NGONS, json.dumps(table))
         model.Objects.AddMesh(made, attributes)
@@ -192,25 +189,21 @@ def _faces(mesh: Any, table: str | None) -> list[list[int]]:
     return faces
 
 
-def _made(rhino: Any, mesh: RawMesh, chosen: Ints) -> tuple[Any, list[tuple[int, list[int]]]]:
-    """A mesh of some faces, and its n-gons: the first triangle of each, and its corners."""
-    faces = [mesh.corners[mesh.offsets[f] : mesh.offsets[f + 1]] for f in chosen.tolist()]
-    whole = len(chosen) == len(mesh.offsets) - 1
-    used = np.arange(len(mesh.points)) if whole else np.unique(np.concatenate(faces))
+def _made(rhino: Any, one: SingleObject) -> tuple[Any, list[tuple[int, list[int]]]]:
+    """The mesh of an object, and its n-gons: the first triangle of each, and its corners."""
     made = rhino.Mesh()
     made.Vertices.UseDoublePrecisionVertices = True
-    for number, place in enumerate(mesh.points[used].tolist()):
+    for number, place in enumerate(one.points.tolist()):
         made.Vertices.Add(*place)
         made.Vertices.SetPoint3dAt(number, rhino.Point3d(*place))  # adding alone is in single precision
     table: list[tuple[int, list[int]]] = []
-    for face in faces:
-        corners = np.searchsorted(used, face)
-        if len(face) <= 4:
+    for corners in one.faces:
+        if len(corners) <= 4:
             made.Faces.AddFace(*corners.tolist())
             continue
         table.append((made.Faces.Count, corners.tolist()))
-        alone = torch.from_numpy(mesh.points[face])
-        for triangle in triangulate(alone, Topology.from_faces([list(range(len(face)))])).triangles.tolist():
+        alone = torch.from_numpy(one.points[corners])
+        for triangle in triangulate(alone, Topology.from_faces([list(range(len(corners)))])).triangles.tolist():
             made.Faces.AddFace(*corners[triangle].tolist())
     made.Normals.ComputeNormals()
     return made, table
@@ -226,7 +219,3 @@ def _layer(rhino: Any, model: Any, path: str, known: dict[str, int]) -> int:
             layer.ParentLayerId = model.Layers[_layer(rhino, model, above, known)].Id
         known[path] = model.Layers.Add(layer)
     return known[path]
-
-
-def _listed(others: Counter[str]) -> str:
-    return ": " + ", ".join(f"{count} {name}" for name, count in sorted(others.items())) if others else ""

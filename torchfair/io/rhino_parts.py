@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from .raw_mesh import Ints
+from .raw_mesh import Floats, Ints, RawMesh
 
 UNITLESS = "None"
 
@@ -41,3 +44,41 @@ class RhinoParts:
             named = any(name or layer for name, layer in self.objects)
             return f"the unit ({self.unit})" + (" and names and layers of objects" if named else "")
         return "" if same_faces or len(self.objects) == 1 else "the single objects"
+
+
+class SingleObject(NamedTuple):
+    """One object of a mesh.
+
+    Attributes:
+        name: Of it.
+        layer: Its layer.
+        points: (n, 3) vertices that its faces use; of the only object all of them.
+        faces: Numbers of these.
+    """
+
+    name: str
+    layer: str
+    points: Floats
+    faces: list[Ints]
+
+
+def single_objects(mesh: RawMesh, parts: RhinoParts) -> Iterator[SingleObject]:
+    """Objects that have faces, one after the other."""
+    for number, (name, layer) in enumerate(parts.objects):
+        chosen = np.flatnonzero(parts.owners == number)
+        if not chosen.size:
+            continue
+        faces = [mesh.corners[mesh.offsets[f] : mesh.offsets[f + 1]] for f in chosen.tolist()]
+        whole = len(chosen) == len(mesh.offsets) - 1
+        used = np.arange(len(mesh.points)) if whole else np.unique(np.concatenate(faces))
+        yield SingleObject(name, layer, mesh.points[used], [np.searchsorted(used, face) for face in faces])
+
+
+def one_object(mesh: RawMesh) -> RhinoParts:
+    """All faces as one object without unit, name and layer."""
+    return RhinoParts(UNITLESS, (("", ""),), np.zeros(len(mesh.offsets) - 1, np.int64))
+
+
+def kinds_listed(others: Counter[str]) -> str:
+    """Kinds of objects that were not read, behind a sentence; empty without any."""
+    return ": " + ", ".join(f"{count} {kind}" for kind, count in sorted(others.items())) if others else ""

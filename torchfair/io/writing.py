@@ -23,6 +23,7 @@ from .ply import Bytes, write_ply
 from .raw_mesh import Ints, RawMesh
 from .rhino import write_rhino
 from .rhino_parts import RhinoParts
+from .written_back import HELD
 
 
 def numbers_from(path: str | os.PathLike[str]) -> int:
@@ -80,7 +81,7 @@ def save_mesh(
         raise MeshFileError(path, "only OBJ files hold polylines. Use save_edge_labels beside files of other formats")
     if colors is not None and suffix != ".ply":
         raise MeshFileError(path, "only PLY files hold colours here. Leave out colors")
-    if attributes is not None and not isinstance(attributes, _ATTRIBUTES.get(suffix, ())):
+    if attributes is not None and not isinstance(attributes, HELD.get(suffix, ())):
         raise MeshFileError(path, "its attributes are not those of such a file. Leave out attributes")
     mesh = _raw_mesh(vertices, topology)
     if attributes is not None:
@@ -115,9 +116,6 @@ def _raw_mesh(vertices: Tensor, topology: Topology) -> RawMesh:
             "Nothing was written."
         )
     return RawMesh(points, topology.corners.cpu().numpy(), topology.face_offsets.cpu().numpy())
-
-
-_ATTRIBUTES: dict[str, type] = {".obj": ObjAttributes, ".3dm": RhinoParts, ".dxf": RhinoParts}
 
 
 def _check_fit(mesh: RawMesh, attributes: ObjAttributes | RhinoParts) -> None:

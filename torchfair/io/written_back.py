@@ -6,7 +6,8 @@ from .obj_attributes import ObjAttributes
 from .rhino_parts import RhinoParts
 
 Attributes = ObjAttributes | RhinoParts
-_OF = {".obj": ObjAttributes, ".3dm": RhinoParts, ".dxf": RhinoParts}
+HELD: dict[str, type] = {".obj": ObjAttributes, ".3dm": RhinoParts, ".dxf": RhinoParts}
+"""What files of a format hold."""
 
 
 def written_back(attributes: Attributes | None, suffix: str, *, same_faces: bool, count: int) -> Attributes | None:
@@ -18,7 +19,7 @@ def written_back(attributes: Attributes | None, suffix: str, *, same_faces: bool
         same_faces: Whether it has the same faces in the same order.
         count: Of its faces.
     """
-    if not isinstance(attributes, _OF.get(suffix, ())):
+    if not isinstance(attributes, HELD.get(suffix, ())):
         return None
     return attributes if same_faces else of_other_faces(attributes, count)
 

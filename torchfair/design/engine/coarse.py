@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from torch import Tensor
 
-from ...geometry import edge_lengths
+from ...geometry._edge_graph import edge_graph
 from ...topology import Topology
 
 _REACH = 3.0  # times the way of a handle
@@ -29,10 +28,8 @@ def coarse_answer(vertices: Tensor, topology: Topology, handles: Tensor, places:
         places: (n, 3) where they are pulled.
         stays: (V,) bool, vertices that do not move; handles do in any case.
     """
-    lengths = edge_lengths(vertices, topology)
-    count, (v, w) = topology.num_vertices, topology.edges.numpy().T
-    graph = coo_array((lengths.numpy(), (v, w)), shape=(count, count)).tocsr()
-    least = _LEAST_REACH * float(lengths.mean())
+    graph = edge_graph(vertices, topology)
+    least = _LEAST_REACH * float(graph.data.mean())
     ways = places - vertices[handles]
     moves = torch.zeros_like(vertices)
     for handle, way in zip(handles.tolist(), ways, strict=True):
@@ -44,7 +41,7 @@ def coarse_answer(vertices: Tensor, topology: Topology, handles: Tensor, places:
         sources = np.flatnonzero(rest.numpy() & np.isfinite(near))
         free = dijkstra(graph, directed=False, indices=sources, limit=reach, min_only=True) if len(sources) else reach
         inside = np.flatnonzero(np.isfinite(near))
-        part, room = 1.0 - near[inside] / reach, np.broadcast_to(np.minimum(free, reach), count)[inside]
+        part, room = 1.0 - near[inside] / reach, np.broadcast_to(np.minimum(free, reach), len(near))[inside]
         weight = part**2 * (3.0 - 2.0 * part) * room / np.maximum(room + near[inside], 1e-300)
         moves[inside] += torch.from_numpy(weight)[:, None] * way
     return vertices + moves

@@ -112,8 +112,7 @@ class FinishedMesh:
             return self._mesh(minimum.as_function_of(others, blocks), start)
         for _ in range(_LINKS):
             blocks = {**found, "vertices": blocks["vertices"]}
-            seen = minimum.as_function_of({**others, SEEN_FROM: blocks["vertices"]}, blocks)
-            blocks = {**seen, "vertices": seen["vertices"]}
+            blocks = minimum.as_function_of({**others, SEEN_FROM: blocks["vertices"]}, blocks)
         return self._mesh(blocks, start)
 
     def _near(self, start: Tensor) -> State:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from torch import Tensor
 
-from ...geometry import edge_lengths
+from ...geometry._edge_graph import edge_graph
 from ...topology import Topology
 
 
@@ -27,9 +27,8 @@ def cone_weights(vertices: Tensor, topology: Topology, handles: Tensor, stays: T
     Returns:
         (V, n); a handle without anything that stays moves its whole component.
     """
-    count, (v, w) = topology.num_vertices, topology.edges.numpy().T
-    graph = coo_array((edge_lengths(vertices, topology).numpy(), (v, w)), shape=(count, count)).tocsr()
-    result = torch.zeros(count, handles.numel(), dtype=vertices.dtype)
+    graph = edge_graph(vertices, topology)
+    result = torch.zeros(topology.num_vertices, handles.numel(), dtype=vertices.dtype)
     for column, handle in enumerate(handles.tolist()):
         rest = stays.clone()
         rest[handles] = True

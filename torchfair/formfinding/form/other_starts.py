@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from scipy.sparse import coo_array, eye_array
+from scipy.sparse import eye_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import ConvexHull, QhullError
 from torch import Tensor
 
 from ..._graph import graph_laplacian
-from ...geometry import corner_angles, edge_lengths, face_area_vectors, vertex_normals
+from ...geometry import corner_angles, face_area_vectors, vertex_normals
+from ...geometry._edge_graph import edge_graph
 from ...linear import factorise
 from ...topology import Topology
 from .starting.patch import Patch
@@ -78,10 +79,8 @@ def _up(vertices: Tensor, topology: Topology) -> tuple[Tensor, bool]:
 
 def _from_the_rim(vertices: Tensor, topology: Topology) -> np.ndarray:
     """(V,) lengths of the shortest ways to the boundary along edges; 0 where there is none."""
-    count, (v, w) = topology.num_vertices, topology.edges.numpy().T
-    graph = coo_array((edge_lengths(vertices, topology).numpy(), (v, w)), shape=(count, count)).tocsr()
     rim = torch.nonzero(topology.is_boundary_vertex).flatten().tolist()
-    found = dijkstra(graph, directed=False, indices=rim, min_only=True)
+    found = dijkstra(edge_graph(vertices, topology), directed=False, indices=rim, min_only=True)
     reached: np.ndarray = np.where(np.isfinite(found), found, 0.0)
     return reached
 
