@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 
+import loss_cases
 import numpy as np
 import pytest
 import torch
@@ -71,20 +72,9 @@ def one_view(values: Tensor, topology: Topology) -> Tensor:
 EYES = torch.tensor([[0.0, 0, 5], [3, 1, 4]], dtype=DOUBLE)
 CAMERA_OF = reflection.ReflectionSetup.for_reference(wavy_grid(5, 5), size=16, supersampling=1)
 LOSSES: dict[str, Callable[[Topology], Loss]] = {
-    "E": energies.NormalVariation,
+    **loss_cases.LOSSES,
     "E, weighted": lambda t: energies.NormalVariation(t, weighted(t)),
-    "E'": energies.AngleVariation,
-    "mean curvature": energies.TotalMeanCurvature,
     "mean curvature, weighted": lambda t: energies.TotalMeanCurvature(t, weighted(t)),
-    "C": energies.TotalAbsoluteCurvature,
-    "C, extrapolated": lambda t: energies.TotalAbsoluteCurvature(t, boundary="extrapolated"),
-    "C2, corrected": lambda t: energies.TotalFrobeniusCurvature(t, estimator="corrected"),
-    "Willmore": energies.WillmoreEnergy,
-    "umbrella": energies.UmbrellaFairness,
-    "polylines": energies.PolylineFairness,
-    "pyramids": stars.PyramidPenalty,
-    "saddles": stars.SaddlePenalty,
-    "reflection variation": reflection.ReflectionVariation,
     "pictures": lambda t: reflection.ReflectionLoss(t, CAMERA_OF, size=16, variation_weight=0.5),
     "pictures, no reference": lambda t: reflection.ReflectionLoss(
         t, CAMERA_OF.without_reference(), size=16, variation_weight=0.5

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 
+import loss_cases
 import pytest
 import torch
 from helpers import DOUBLE, wavy_grid
@@ -12,7 +13,7 @@ from torch import Tensor
 from torch.fx.experimental.proxy_tensor import make_fx
 from torch.utils.checkpoint import checkpoint
 
-from torchfair import Topology, TorchfairError, energies, reflection, stars
+from torchfair import Topology, TorchfairError, energies, reflection
 
 VERTICES, TOPOLOGY = wavy_grid(4, 4, triangles=True)
 DIRECTION = torch.linspace(-1, 1, VERTICES.numel(), dtype=DOUBLE).view_as(VERTICES).sin()
@@ -21,19 +22,8 @@ BATCH = torch.stack([VERTICES, OTHER])
 
 Loss = Callable[[Tensor], Tensor]
 LOSSES: dict[str, Callable[[Topology], energies.MeshModule]] = {
-    "E": energies.NormalVariation,
+    **loss_cases.LOSSES,
     "E, weighted": lambda t: energies.NormalVariation(t, torch.linspace(0, 1, t.num_interior_edges, dtype=DOUBLE)),
-    "E'": energies.AngleVariation,
-    "mean curvature": energies.TotalMeanCurvature,
-    "C": energies.TotalAbsoluteCurvature,
-    "C, extrapolated": lambda t: energies.TotalAbsoluteCurvature(t, boundary="extrapolated"),
-    "C2, corrected": lambda t: energies.TotalFrobeniusCurvature(t, estimator="corrected"),
-    "Willmore": energies.WillmoreEnergy,
-    "umbrella": energies.UmbrellaFairness,
-    "polylines": energies.PolylineFairness,
-    "pyramids": stars.PyramidPenalty,
-    "saddles": stars.SaddlePenalty,
-    "reflection variation": reflection.ReflectionVariation,
 }
 
 
