@@ -227,3 +227,11 @@ def test_pinned_and_on_a_gpu() -> None:
     assert moved.topology == BATCH.topology
     value = NormalVariation(moved.topology)(moved.vertices)
     torch.testing.assert_close(value.cpu(), NormalVariation(BATCH.topology)(BATCH.vertices))
+
+
+def test_a_list_is_no_mesh_whatever_is_in_it() -> None:
+    """Its entries are collated one by one, as those of any list."""
+    vertices, topology = wavy_grid(3, 3)
+    points, joined = collate([[vertices, topology], [vertices, topology]])
+    assert points.shape == (2, *vertices.shape)
+    assert joined.num_meshes == 2

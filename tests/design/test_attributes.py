@@ -129,6 +129,7 @@ ALIEN: list[Any] = [
     {"statements": [[0, "call evil.obj"]]},
     {"statements": [[3, "g a"]]},
     {"statements": [[1, "g a"], [0, "g b"]]},
+    {"statements": [[0, "g a"], [2, "g b"], [1, "g c"]]},
     {"statements": [["x", "g a"]]},
     {"textures": ["v 1 1"]},
     {"behind": ["1"]},

@@ -91,6 +91,7 @@ def test_a_click_on_an_edge_marks_it_as_principal(tube_window: Window) -> None:
         window.page.mouse.click(0.5 * (x + u), 0.5 * (y + v))
         window.wait(f"{marked} === {wanted}")
         window.at_rest()
+        assert window(marked) == wanted
 
 
 def test_strips_are_laid_flat_and_saved(tube_window: Window, tmp_path: Path) -> None:
