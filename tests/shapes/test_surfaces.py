@@ -6,7 +6,7 @@ import math
 
 import pytest
 import torch
-from torch.func import jacrev, vmap
+from torch.func import jacrev, jvp, vmap
 
 from torchfair.errors import TorchfairError
 from torchfair.shapes import (
@@ -25,6 +25,7 @@ from torchfair.shapes import (
     Surface,
     Torus,
 )
+from torchfair.shapes._forms import plain_tangents
 
 CASES = {name: make() for name, make in SURFACES.items()} | {
     "bowl": PrincipalParaboloid(2.0, 0.5, (0.7, 1.0)),
@@ -71,6 +72,19 @@ def test_normals_and_frame_are_right_handed_orthonormal(surface):
     torch.testing.assert_close(torch.linalg.det(frame), torch.ones(40, dtype=torch.float64))
     assert (torch.linalg.cross(x_u, x_v) * frame[:, 2]).sum(-1).min() > 0
     torch.testing.assert_close((frame[:, 0] * x_u).sum(-1), x_u.norm(dim=-1))
+
+
+def test_tangents_are_forward_derivatives(surface):
+    """Along u, along v; those of numbers are the same to the bit."""
+    u, v = sample(surface)
+    one, zero = torch.ones_like(u), torch.zeros_like(u)
+    tangents = surface.tangents(u, v)
+    for found, plain, direction in zip(
+        tangents, plain_tangents(surface._position, u, v), ((one, zero), (zero, one)), strict=True
+    ):
+        torch.testing.assert_close(found, jvp(surface._position, (u, v), direction)[1], rtol=1e-13, atol=1e-13)
+        assert torch.equal(found, plain)
+        assert not plain.requires_grad
 
 
 def test_weingarten(surface):

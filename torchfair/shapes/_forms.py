@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 
 import torch
 from torch import Tensor
-from torch.func import jvp
+from torch.func import vjp
 
 Map = Callable[[Tensor, Tensor], Tensor]
 
@@ -23,13 +23,35 @@ class ShapeOperator(NamedTuple):
 def tangents(position: Map, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor]:
     """Partial derivatives ``x_u, x_v`` ``(..., 3)``.
 
-    ``position`` treats every parameter pair on its own, so one forward-mode product with a tensor of ones
-    differentiates all points at once. Stacked copies of the points take one direction each.
+    ``position`` treats every parameter pair on its own.
     """
-    one, zero = torch.ones_like(u), torch.zeros_like(u)
-    points = (torch.stack([u, u]), torch.stack([v, v]))
-    x_u, x_v = cast(Tensor, jvp(position, points, (torch.stack([one, zero]), torch.stack([zero, one])))[1])
+    _, x_u, x_v = _derivatives(position, u, v)
     return x_u, x_v
+
+
+def plain_tangents(position: Map, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor]:
+    """The same, of numbers only: without derivatives of its own, and outside function transforms.
+
+    Products of :mod:`torch.func` import the compiler of torch, which takes longer than most meshes of a surface do.
+    """
+    with torch.enable_grad():
+        u, v = u.detach().requires_grad_(), v.detach().requires_grad_()
+        components = position(u, v).unbind(-1)
+        rows = [torch.autograd.grad(x.sum(), (u, v), retain_graph=True, materialize_grads=True) for x in components]
+    x_u, x_v = (torch.stack(parts, dim=-1) for parts in zip(*rows, strict=True))
+    return x_u, x_v
+
+
+def _derivatives(function: Map, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Values ``(..., n)`` and both partial derivatives of a function of single points.
+
+    One reverse product for each component, over all points at once: of three components that is faster than the
+    forward products, which compute with pairs throughout.
+    """
+    values, pulled_back = cast("tuple[Tensor, Callable[[Tensor], tuple[Tensor, Tensor]]]", vjp(function, u, v))
+    components = torch.eye(values.shape[-1], dtype=values.dtype, device=values.device).unbind(0)
+    by_u, by_v = zip(*(pulled_back(component.expand_as(values)) for component in components), strict=True)
+    return values, torch.stack(by_u, dim=-1), torch.stack(by_v, dim=-1)
 
 
 class Partials(NamedTuple):
@@ -43,17 +65,13 @@ class Partials(NamedTuple):
 
 
 def partials(position: Map, u: Tensor, v: Tensor) -> Partials:
-    """All partial derivatives up to order two, from the first and second ones along u, v and their diagonal."""
-    one, zero = torch.ones_like(u), torch.zeros_like(u)
-    points = (torch.stack([u, u, u]), torch.stack([v, v, v]))
-    directions = (torch.stack([one, zero, one]), torch.stack([zero, one, one]))
+    """All partial derivatives up to order two; the mixed one is the mean of both orders."""
 
-    def along(u: Tensor, v: Tensor) -> Tensor:
-        return cast(Tensor, jvp(position, (u, v), directions)[1])
+    def both(u: Tensor, v: Tensor) -> Tensor:
+        return torch.cat(tangents(position, u, v), dim=-1)
 
-    first, second = cast("tuple[Tensor, Tensor]", jvp(along, points, directions))
-    x_uu, x_vv, diagonal = second
-    return Partials(first[0], first[1], x_uu, 0.5 * (diagonal - x_uu - x_vv), x_vv)
+    first, by_u, by_v = (pair.tensor_split(2, dim=-1) for pair in _derivatives(both, u, v))
+    return Partials(first[0], first[1], by_u[0], 0.5 * (by_u[1] + by_v[0]), by_v[1])
 
 
 def fundamental_forms(x: Partials) -> tuple[Tensor, Tensor]:

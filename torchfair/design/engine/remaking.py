@@ -12,7 +12,6 @@ from torch import Tensor
 
 from ...errors import MeshError
 from ...io.written_back import of_other_faces
-from ...meshing import principal_quads, principal_triangles
 from ...principal import PrincipalEdges, misalignment_of
 from ...topology import Topology
 from ..command_line import job_step
@@ -77,6 +76,8 @@ def _kept_names(names: np.ndarray, count: int) -> np.ndarray:
 
 def _meshed(document: Document, options: Mapping[str, Any]) -> tuple[Document, list[str]]:
     vertices, topology = tensor_of(document.vertices), topology_of(document)
+    from ...meshing import principal_quads, principal_triangles  # here, because most designs begin without it
+
     make = principal_quads if options["kind"] == "quads" else principal_triangles
     made = make(vertices, topology, count=options["count"])
     step = {"do": "mesh", **options}

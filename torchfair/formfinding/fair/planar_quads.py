@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from ...meshing import QuadMesh, measure_mesh_on
 from ...projection import Callback
 from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level
 from .recipe import minimise_normal_variation
+
+if TYPE_CHECKING:
+    from ...meshing import QuadMesh
 
 PLANAR_QUADS = FairSettings(planar="quads", distance_limit=0.03, directions="keep")
 """Planar polygons at most 3 % of a mean edge from the surface, with edges that keep their directions."""
@@ -46,6 +49,8 @@ def planar_quads(
         >>> made.report["planarity_max"] < 1e-4, job.holds
         (True, True)
     """
+    from ...meshing import measure_mesh_on  # here, because other jobs need nothing of meshing
+
     job = minimise_normal_variation(
         mesh.vertices, mesh.topology, reference=surface, settings=PLANAR_QUADS, callback=callback
     )

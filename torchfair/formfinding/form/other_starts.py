@@ -8,7 +8,6 @@ import numpy as np
 import torch
 from scipy.sparse import eye_array
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import ConvexHull, QhullError
 from torch import Tensor
 
 from ..._graph import graph_laplacian
@@ -87,6 +86,8 @@ def _from_the_rim(vertices: Tensor, topology: Topology) -> np.ndarray:
 
 def _on_hull(vertices: Tensor, topology: Topology, up: Tensor, distance: np.ndarray) -> Tensor | None:
     """Inner vertices lifted along ``up`` to the convex hull of the boundary; None if that is flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
     points, way = vertices.numpy(), up.numpy()
     try:
         planes = ConvexHull(points[topology.is_boundary_vertex.numpy()]).equations
