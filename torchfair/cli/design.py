@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from .arguments import count
 from .errors import CommandError
 from .exit_codes import EXIT_OK
-from .reading import add_repair
+from .reading import add_repair, read_options
 
 if TYPE_CHECKING:
     from ..design.engine.requests import Open
@@ -46,7 +46,7 @@ def add_parser(subparsers: Any) -> None:
     add("--frame", action="append", default=[], metavar="ORIGIN", help="let pages of this origin, such as a notebook "
         "server, show the page in a frame; repeatable")  # fmt: skip
     add("--upload", type=count, default=128, metavar="MIB", help="largest file that may be dropped (default 128)")
-    add_repair(parser, surfaces=False)
+    add_repair(parser)
     parser.set_defaults(run=run, name=NAME)
 
 
@@ -85,11 +85,12 @@ def run(arguments: argparse.Namespace) -> int:
 def _opening(arguments: argparse.Namespace) -> Open | None:
     """What is opened first."""
     from ..design.engine.requests import Open
+    from ..design.reading_words import words_of
 
     if arguments.input is None:
         return None
-    repair = [name for name in ("repair", "weld", "split_edges") if getattr(arguments, name)]
+    repair = words_of(read_options(arguments))
     if not arguments.input.startswith("example:") and not Path(arguments.input).is_file():
         raise CommandError(f"{arguments.input}: there is no such file")
     title = arguments.input if arguments.input.startswith("example:") else Path(arguments.input).name
-    return Open(0, arguments.input, None, title, tuple(repair), bool(repair))
+    return Open(0, arguments.input, None, title, repair, bool(repair))

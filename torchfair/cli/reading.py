@@ -18,7 +18,7 @@ _DEFAULT = "auto"
 _READ = {"repair": False, "weld": False, "split_edges": False, "surfaces": None}
 
 
-def add_repair(parser: argparse.ArgumentParser, *, surfaces: bool = True) -> None:
+def add_repair(parser: argparse.ArgumentParser) -> None:
     """The options to weld and repair what is read, and to sample surfaces."""
     add = parser.add_argument
     add("--repair", action="store_true", help="first drop repeated corners, double faces, faces without area and "
@@ -27,13 +27,8 @@ def add_repair(parser: argparse.ArgumentParser, *, surfaces: bool = True) -> Non
         "boundary at the same place one edge; TOLERANCE is a distance (default: 1e-6 of the extent, or rounding to "
         "single precision)")  # fmt: skip
     add("--split-edges", action="store_true", help="repair, and split edges of more than two faces into pairs of faces")
-    if surfaces:
-        _add_surfaces(parser)
-
-
-def _add_surfaces(parser: argparse.ArgumentParser) -> None:
     words = "sample surfaces of 3DM files, too, by grids of N by M cells (default of M: N)"
-    parser.add_argument("--surfaces", type=_cells, metavar="N[,M]", help=words)
+    add("--surfaces", type=_cells, metavar="N[,M]", help=words)
 
 
 def read_options(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from .autosave import autosave_path
 from .commands import CommandRefused
 from .session_file import SUFFIX
 
-OPENS = (".obj", ".ply", ".off", ".stl", ".3dm", ".glb", ".gltf", SUFFIX)
+OPENS = (".obj", ".ply", ".off", ".stl", ".3dm", ".dxf", ".glb", ".gltf", SUFFIX)
 """Extensions of files that are listed and opened."""
 _MOST = 500
 

@@ -16,6 +16,7 @@ FORMATS: Mapping[str, tuple[str, str, str]] = {
     "glb": (".glb", "GLB, triangles in single precision", "model/gltf-binary"),
     "stl": (".stl", "STL, triangles in single precision", "model/stl"),
     "3dm": (".3dm", "3DM", "application/octet-stream"),
+    "dxf": (".dxf", "DXF, MESH entities", "image/vnd.dxf"),
     "strips": (".svg", "strips laid flat, SVG", "image/svg+xml"),
 }
 """Suffix, words and media type by name."""

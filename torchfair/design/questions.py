@@ -6,13 +6,17 @@ from collections.abc import Mapping
 
 AS_IT_IS, CANCEL = "as_it_is", "cancel"
 KEPT, FILE = "kept", "file"
+CELLS = (10, 20, 40)
+"""By which surfaces are sampled, in each direction."""
 REPAIRS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "weld": (("weld",), "weld edges at the same place"),
     "repair": (("repair",), "repair"),
     "repair_and_weld": (("repair", "weld"), "repair, and weld edges at the same place"),
     "split_edges": (("repair", "split_edges"), "repair, and split edges of more than two faces"),
+    **{f"surfaces_{n}": ((f"surfaces={n}",), f"sample its surfaces, {n} by {n} cells each") for n in CELLS},
+    **{f"surfaces_{n}_weld": ((f"surfaces={n}", "weld"), f"{n} by {n} cells each, and weld them") for n in CELLS},
 }
-"""Answers, what they mean for :func:`torchfair.io.load_mesh`, and words."""
+"""Answers, what they mean for reading the file (see :mod:`.reading_words`), and words."""
 
 
 def kept_question(name: str) -> tuple[str, tuple[tuple[str, str], ...]]:

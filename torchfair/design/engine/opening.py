@@ -15,11 +15,14 @@ from ...io import PolygonMesh, edge_labels_path, load_edge_labels, load_mesh
 from ...shapes import EXAMPLES, SURFACES, builtin_mesh
 from ..document import Document, Ints
 from ..limits import MOST_VERTICES
-from ..questions import REPAIRS, answers
+from ..questions import CELLS, REPAIRS, answers
+from ..reading_words import options_of
 from ..session_file import KEPT, SUFFIX, read_session
 from .recipes import faces_of
 from .requests import Open
 from .saying import Asked, Event, Made
+
+_SAMPLED = ", or sample them"  # how messages go on where there are surfaces
 
 
 def opened(request: Open) -> Event:
@@ -53,9 +56,8 @@ def _of_file(request: Open, path: Path, title: str) -> Event:
     if path.suffix.lower() == SUFFIX:
         stored, kept = read_session(path), path.name.endswith(KEPT)
         return Made(request.serial, stored.documents, stored.now, camera=stored.camera, is_session=not kept)
-    options = dict.fromkeys(request.repair, True)
     try:
-        mesh = load_mesh(path, **options)
+        mesh = load_mesh(path, **options_of(request.repair))
     except TorchfairError as error:
         question = _question(path, str(error), request)
         if question is None:
@@ -68,16 +70,23 @@ def _of_file(request: Open, path: Path, title: str) -> Event:
 
 
 def _question(path: Path, fault: str, request: Open) -> Asked | None:
-    """Whether to repair, where that mends the fault."""
+    """Whether to repair, where that mends the fault; and how to sample surfaces, where there is nothing else.
+
+    Raises:
+        TorchfairError: surfaces cannot be sampled, with the reason.
+    """
     if request.asked:
         return None
+    words = fault.replace(os.fspath(path), Path(request.name).name)
+    if _SAMPLED in fault:
+        sampled = load_mesh(path, surfaces=CELLS[0])  # says what is trimmed
+        weld = "_weld" * _has_seams(sampled)
+        return Asked(request.serial, words.split(_SAMPLED)[0], answers(*(f"surfaces_{n}{weld}" for n in CELLS)))
     for value in ("repair", "split_edges"):
-        options = dict.fromkeys(REPAIRS[value][0], True)
         try:
-            mended = load_mesh(path, **options)
+            mended = load_mesh(path, **options_of(REPAIRS[value][0]))
         except TorchfairError:
             continue
-        words = fault.replace(os.fspath(path), Path(request.name).name)
         words = words.split(" repair=True")[0].split(" split_edges=True")[0]
         choices = [value, "repair_and_weld"] if value == "repair" and _has_seams(mended) else [value]
         return Asked(request.serial, words, answers(*choices))

@@ -65,7 +65,7 @@ class Open(Request):
         name: A path, ``example:NAME``, or the name of what is uploaded.
         data: What is uploaded; None for a file.
         title: What the mesh shall be called.
-        repair: As of :func:`torchfair.io.load_mesh`: some of repair, weld, split_edges.
+        repair: How it is read, in the words of the command line: ``repair``, ``weld=0.01``.
         asked: Whether a person has decided how it is read, so that nothing is asked again.
         fresh: Whether a person has decided to open the file itself, not what was kept of its edits.
     """
