@@ -23,14 +23,10 @@ from .eliminated_principal_symmetric import Coplanar as Coplanar
 from .eliminated_principal_symmetric import Cospherical as Cospherical
 from .eliminated_principal_symmetric import eliminated_principal_symmetric_terms as eliminated_principal_symmetric_terms
 from .fairness import BoundaryFairness as BoundaryFairness
-from .fairness import DisplacementFairness as DisplacementFairness
-from .fairness import EvenFairness as EvenFairness
 from .fairness import InteriorFairness as InteriorFairness
 from .fairness import StraightFairness as StraightFairness
 from .fairness import TangentialFairness as TangentialFairness
 from .fairness import boundary_fairness_terms as boundary_fairness_terms
-from .fairness import displacement_fairness_terms as displacement_fairness_terms
-from .fairness import even_fairness_terms as even_fairness_terms
 from .fairness import interior_fairness_terms as interior_fairness_terms
 from .fairness import polyline_fairness_terms as polyline_fairness_terms
 from .fairness import tangential_fairness_terms as tangential_fairness_terms
@@ -41,6 +37,10 @@ from .gliding import Gliding as Gliding
 from .gliding import gliding_terms as gliding_terms
 from .handles import Handles as Handles
 from .handles import handle_terms as handle_terms
+from .held_fairness import DisplacementFairness as DisplacementFairness
+from .held_fairness import EvenFairness as EvenFairness
+from .held_fairness import displacement_fairness_terms as displacement_fairness_terms
+from .held_fairness import even_fairness_terms as even_fairness_terms
 from .lifted_absolute_curvature import lifted_absolute_curvature_blocks as lifted_absolute_curvature_blocks
 from .lifted_absolute_curvature import lifted_absolute_curvature_terms as lifted_absolute_curvature_terms
 from .lifted_normal_variation import lifted_flat_edge_terms as lifted_flat_edge_terms

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from ..._graph import edge_numbers
 from ...boundary import boundary_corners
-from ...constraints.fairness import second_difference
+from ...constraints.fairness_residuals import second_difference
 from ...creases import crease_chains, crease_corners, crease_edges
 from ...projection import ElementTerm
 from ...subdivision import Refinement
