@@ -17,7 +17,8 @@ from helpers import wavy_grid
 from torchfair import MeshFileError, load_mesh, save_mesh
 from torchfair.design.effects import Deliver
 from torchfair.design.engine.requests import Open
-from torchfair.design.session_file import read_session, session_bytes
+from torchfair.design.session_file import read_session
+from torchfair.design.session_writing import session_bytes
 from torchfair.io import ObjAttributes, RhinoParts
 
 TEXT = """mtllib shop.mtl

@@ -18,7 +18,8 @@ from torchfair.design.autosave import Keeper, autosave_path
 from torchfair.design.document import Faces
 from torchfair.design.effects import Autosave
 from torchfair.design.engine.requests import Open
-from torchfair.design.session_file import read_session, session_bytes
+from torchfair.design.session_file import read_session
+from torchfair.design.session_writing import session_bytes
 from torchfair.design.states import DesignState
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 .1\nv 0 1 0\n"

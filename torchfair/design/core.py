@@ -16,7 +16,7 @@ from .folder import Folder
 from .history import History
 from .pending import Drag, Pending
 from .questions import kept_question
-from .session_file import session_bytes
+from .session_writing import session_bytes
 from .states import DesignState, allowed
 from .telling import done_messages, dragged_words, error_message, handles_message, notice, state_message
 

@@ -14,7 +14,7 @@ from .effects import Autosave, Deliver, Effect, Store, Tell
 from .engine import requests as r
 from .formats import FORMATS, SESSION
 from .questions import FILE, KEPT, REPAIRS
-from .session_file import session_bytes
+from .session_writing import session_bytes
 from .states import DesignState
 
 S = DesignState

@@ -87,7 +87,8 @@ def view(
 
     require_websockets()
     from .server import ServerSettings
-    from .session_file import SUFFIX, session_bytes
+    from .session_file import SUFFIX
+    from .session_writing import session_bytes
 
     document = _document(vertices, topology, title)
     opening = Open(0, f"{title}{SUFFIX}", session_bytes([document], 0), title)

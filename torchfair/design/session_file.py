@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ import numpy as np
 from ..errors import MeshFileError
 from .commands import COMMANDS
 from .document import MODES, Document, Faces
-from .stored_attributes import attribute_words, stored_attributes
+from .stored_attributes import stored_attributes
 
 SUFFIX = ".torchfair"
 KEPT = f".autosave{SUFFIX}"
@@ -26,7 +25,8 @@ VERSION = 1
 _LARGEST = 1 << 30
 """Bytes of all arrays together."""
 _MOST = 100_000
-_ARRAYS = ("corners", "offsets", "start", "vertices", "principal", "names")
+ARRAYS = ("corners", "offsets", "start", "vertices", "principal", "names")
+"""Of each document."""
 
 
 @dataclass(frozen=True)
@@ -42,67 +42,6 @@ class StoredSession:
     documents: tuple[Document, ...]
     now: int
     camera: Mapping[str, Any] | None = None
-
-
-def session_bytes(documents: Sequence[Document], now: int, camera: Mapping[str, Any] | None = None) -> bytes:
-    """The content of a session file; arrays that several documents share are stored once."""
-    arrays: dict[int, tuple[str, Any]] = {}
-    numbers: dict[int, int] = {}
-    entries: list[dict[str, Any]] = []
-    files: dict[int, int] = {}
-    listed: list[dict[str, Any]] = []
-
-    def stored(array: Any) -> str | None:
-        if array is None:
-            return None
-        if id(array) not in arrays:
-            arrays[id(array)] = f"array{len(arrays)}", array
-        return arrays[id(array)][0]
-
-    def attributes(document: Document) -> int | None:
-        if document.attributes is None:
-            return None
-        if id(document.attributes) not in files:
-            files[id(document.attributes)] = len(listed)
-            listed.append(attribute_words(document.attributes, stored))
-        return files[id(document.attributes)]
-
-    def entry(document: Document) -> int:
-        if id(document) not in numbers:
-            coarse = None if document.coarse is None else entry(document.coarse)
-            parts = {
-                "corners": document.faces.corners,
-                "offsets": document.faces.offsets,
-                **{name: getattr(document, name) for name in _ARRAYS[2:]},
-            }
-            words = _words(document) | {"coarse": coarse, "attributes": attributes(document)}
-            entries.append(words | {n: stored(a) for n, a in parts.items()})
-            numbers[id(document)] = len(entries) - 1
-        return numbers[id(document)]
-
-    history = [entry(document) for document in documents]
-    head = {"torchfair": VERSION, "history": history, "now": now, "camera": camera, "attributes": listed,
-            "documents": entries}  # fmt: skip
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:
-        file.writestr("design.json", json.dumps(head, allow_nan=False))
-        for name, array in arrays.values():
-            with file.open(f"{name}.npy", "w") as part:
-                np.lib.format.write_array(part, np.ascontiguousarray(array), allow_pickle=False)
-    return buffer.getvalue()
-
-
-def _words(document: Document) -> dict[str, Any]:
-    return {
-        "title": document.title,
-        "mode": document.mode,
-        "handles": [[vertex, *place] for vertex, place in document.handles.items()],
-        "held": list(document.held),
-        "weights": document.weights,
-        "choices": document.choices,
-        "steps": list(document.history),
-        "words": document.words,
-    }
 
 
 def read_session(path: Path) -> StoredSession:
@@ -137,7 +76,7 @@ def _read(file: zipfile.ZipFile) -> StoredSession:
     if not 0 < len(head["documents"]) <= _MOST:
         raise ValueError("it holds no mesh")
     for entry in head["documents"]:
-        arrays = {name: _array(file, entry[name], known) for name in _ARRAYS}
+        arrays = {name: _array(file, entry[name], known) for name in ARRAYS}
         coarse = None if entry["coarse"] is None else documents[_index(entry["coarse"], len(documents))]
         document = _document(entry, arrays, coarse)
         number = entry.get("attributes")  # older files have none
@@ -164,7 +103,7 @@ def _array(file: zipfile.ZipFile, name: Any, known: dict[str, Any]) -> Any:
 
 
 def _document(entry: Mapping[str, Any], arrays: Mapping[str, Any], coarse: Document | None) -> Document:
-    corners, offsets, start, vertices = (arrays[name] for name in _ARRAYS[:4])
+    corners, offsets, start, vertices = (arrays[name] for name in ARRAYS[:4])
     count = len(start)
     if vertices.shape != (count, 3) or start.shape != (count, 3):
         raise ValueError("its places do not fit each other")
