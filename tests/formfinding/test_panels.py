@@ -56,7 +56,7 @@ def test_a_free_boundary_lets_go_of_handles() -> None:
 
     def weighed(handles: dict[int, tuple[float, float, float]]) -> float:
         problem = FairRecipe(bent(0.3), TRIANGLES, settings=settings, handles=handles).problem
-        return sum(float(term.element_weights.sum()) for term in problem._free.terms(weight=1.0))
+        return sum(float(term.element_weights.sum()) for term in problem.free.terms(weight=1.0))
 
     assert weighed({0: (0.0, 0.0, 1.0), 1: (0.0, 1.0, 1.0)}) == weighed({}) - 2
 

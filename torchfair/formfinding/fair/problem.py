@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cached_property
 
 import torch
 from torch import Tensor
 
-from ... import constraints as c
+from ...constraints import lifted_normal_variation_blocks
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...settings.fair_settings import FairSettings
@@ -26,10 +25,10 @@ from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
 from .panels import Panels
+from .terms import fair_terms, planar_terms
 
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8
-_NEAR = 1.0  # weight of closeness while faces become planar
 _MOST_STAGES = 20
 
 
@@ -50,6 +49,8 @@ class FairProblem:
         near: Closeness to the reference surface.
         bounds: On corner angles and areas of faces.
         input_edge: Mean edge length of the input.
+        curves: Along boundary and creases.
+        corners: (V,) bool, where the boundary turns.
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
         panels: Faces that are kept planar and edges that are kept flat.
         loose: (V,) bool, corners of boundary and creases that become planar faces may take along.
@@ -75,8 +76,8 @@ class FairProblem:
         self.notes: list[str] = []
         self._has_other_reference, self.has_other_goals = reference is not None, False
         self.near_input = reference is None if near_input is None else near_input
-        self.input_edge, self._curves = input_edge, rim or feature_curves(vertices, topology, settings)
-        self.corners = self._curves.rim.corners
+        self.input_edge, self.curves = input_edge, rim or feature_curves(vertices, topology, settings)
+        self.corners = self.curves.rim.corners
         self._tell_of_creases()
         self.bounds = FaceBounds(vertices, topology, pulls)
         self.panels = Panels(vertices, topology, settings, self.notes)
@@ -147,45 +148,13 @@ class FairProblem:
         return [(i + 1) / steps for i in range(steps)]
 
     def terms(self, share: float, blur: float = 1.0) -> list[ElementTerm]:
-        """Element terms of a stage.
-
-        Args:
-            share: See :meth:`shares`; above 1 it raises planarity beyond its weight.
-            blur: Factor of the smoothing of the absolute value.
-        """
-        settings = self.settings
-        return [
-            *self._energy(blur),
-            *self.near.terms(weight=settings.closeness_weight, barrier_weight=settings.quality_weight),
-            *self._boundary(),
-            *self._loosely(),
-            *self._fairness(),
-            *self.bounds.terms(settings),
-            *self.pulls.terms(weight=settings.handle_weight),
-            *self.panels.planar_terms(share),
-            *self.panels.nearly_planar_terms(share),
-            *self.panels.flat_terms(share),
-            *self._directions(),
-        ]
-
-    def planar_terms(self, share: float) -> list[ElementTerm]:
-        """Element terms of a stage that makes faces planar near where they are, whatever becomes of E."""
-        settings = self.settings
-        return [
-            *self.near.terms(weight=_NEAR, barrier_weight=settings.quality_weight),
-            *self._boundary(),
-            *self._loosely(),
-            *c.displacement_fairness_terms(self.vertices, self.topology, weight=settings.fairness_weight),
-            *self.bounds.terms(settings),
-            *self.pulls.terms(weight=settings.handle_weight),
-            *self.panels.planar_terms(share),
-            *self.panels.flat_terms(share),
-        ]
+        """Element terms of a stage, see :func:`.fair_terms`."""
+        return fair_terms(self, share, blur)
 
     def planar_stage(self, state: State, share: float) -> Stage:
-        """A run of guided projection with :meth:`planar_terms`."""
+        """A run of guided projection with :func:`.planar_terms`."""
         blocks = {"vertices": state["vertices"]}
-        return self._stage("planar", blocks, lambda: self.planar_terms(share), (share,), self.settings.stage())
+        return self._stage("planar", blocks, lambda: planar_terms(self, share), (share,), self.settings.stage())
 
     def _stage(
         self,
@@ -246,7 +215,7 @@ class FairProblem:
         """Variable blocks at ``vertices``; auxiliary variables satisfy their constraints there."""
         if self.settings.formulation == "reduced":
             return {"vertices": vertices}
-        return {"vertices": vertices, **c.lifted_normal_variation_blocks(vertices, self.topology)}
+        return {"vertices": vertices, **lifted_normal_variation_blocks(vertices, self.topology)}
 
     # ---- decisions -------------------------------------------------------------------------------------
 
@@ -258,7 +227,7 @@ class FairProblem:
             "fixed": self.topology.is_boundary_vertex.clone(),
             "free": torch.zeros_like(isolated),
         }
-        fixed = kinds[self.settings.boundary] | isolated | (self._curves.corners & ~self.topology.is_boundary_vertex)
+        fixed = kinds[self.settings.boundary] | isolated | (self.curves.corners & ~self.topology.is_boundary_vertex)
         return fixed & ~self.pulls.pulled & ~self.loose
 
     def _loose_corners(self) -> Tensor:
@@ -267,10 +236,10 @@ class FairProblem:
         corners = self.corners if settings.boundary == "glide" else torch.zeros_like(self.corners)
         if not self.panels.makes_planar or settings.projection.takes_every_step:
             return torch.zeros_like(corners)
-        return self.panels.warped_corners(self.vertices) & (corners | self._curves.stay)
+        return self.panels.warped_corners(self.vertices) & (corners | self.curves.stay)
 
     def _tell_of_creases(self) -> None:
-        count, stay = int((self._curves.edges >= 0).sum()), int(self._curves.stay.sum())
+        count, stay = int((self.curves.edges >= 0).sum()), int(self.curves.stay.sum())
         if count:
             degrees = math.degrees(self.settings.crease_angle)
             self.notes.append(
@@ -278,62 +247,17 @@ class FairProblem:
                 f"{stay} corners stay; 0 degrees for no creases"
             )
 
-    # ---- terms -----------------------------------------------------------------------------------------
-
-    def _energy(self, blur: float) -> list[ElementTerm]:
-        settings = self.settings
-        if settings.formulation == "reduced":
-            smoothing = blur * settings.smoothing
-            return c.normal_variation_terms(self.topology, smoothing=smoothing, weight=settings.energy_weight)
-        planar = self.topology.face_sizes == 3
-        planar[self.panels.planar] = True
-        return c.lifted_normal_variation_terms(
-            self.vertices,
-            self.topology,
-            planar,
-            weight=settings.energy_weight,
-            constraint_weight=settings.constraint_weight,
-        )
-
-    def _directions(self) -> list[ElementTerm]:
-        if self.settings.directions == "free":
-            return []
-        every = torch.arange(self.topology.num_interior_edges)
-        return c.edge_direction_terms(self.vertices, self.topology, every, weight=self.settings.direction_weight)
-
     def _gliding_boundary(self) -> GlidingBoundary | None:
         glides = self.settings.boundary == "glide"
-        if not glides and not self._curves.points:
+        if not glides and not self.curves.points:
             return None
-        held = (self.topology.is_boundary_vertex & glides) | self._curves.on_creases
-        return GlidingBoundary(held, self._curves.curves(boundary=glides), self.pulls, self.panels.corners)
-
-    def _fairness(self) -> list[ElementTerm]:
-        weight = self.settings.fairness_weight
-        if self.settings.second_differences:
-            return c.polyline_fairness_terms(self.topology, weight=weight, corners=self.corners)
-        terms = c.interior_fairness_terms(self.topology, weight=weight)
-        if self.settings.boundary == "glide":
-            terms += c.boundary_fairness_terms(self.topology, self.corners, weight=weight)
-        return [*terms, *self._curves.fairness_terms(self.topology, weight=weight)]
-
-    def _boundary(self) -> list[ElementTerm]:
-        free = self._free.terms(weight=self.settings.free_boundary_weight) if self.settings.boundary == "free" else []
-        if self.boundary is None or self.boundary.feet is None:
-            return free
-        gliding = c.gliding_terms(self.boundary.feet, weight=self.settings.boundary_weight)
-        weights = self.boundary.glides.to(self.vertices)
-        return [*free, *(replace(term, element_weights=weights) for term in gliding)]
+        held = (self.topology.is_boundary_vertex & glides) | self.curves.on_creases
+        return GlidingBoundary(held, self.curves.curves(boundary=glides), self.pulls, self.panels.corners)
 
     @cached_property
-    def _free(self) -> FreeBoundary:
-        return FreeBoundary(self.vertices, self._curves.rim, self.pulls)
-
-    def _loosely(self) -> list[ElementTerm]:
-        """Draws corners that may move to where they were."""
-        chosen = torch.nonzero(self.loose & ~self.pulls.pulled).squeeze(1)
-        places = self.vertices[chosen]
-        return c.handle_terms(chosen, places, weight=self.settings.boundary_weight, name="corners")
+    def free(self) -> FreeBoundary:
+        """What a free boundary is held by."""
+        return FreeBoundary(self.vertices, self.curves.rim, self.pulls)
 
     # ---- guards ----------------------------------------------------------------------------------------
 
