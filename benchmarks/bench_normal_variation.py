@@ -6,14 +6,15 @@ Run from the repository root::
 
 Rows, all on one triangle mesh of a torus with vertices shaken along the surface:
 
-- ``torchfair``: ``normal_variation(vertices, topology).backward()``.
+- ``torchfair``: ``normal_variation(vertices, topology).backward()``; with the optional package numba by compiled loops.
+- ``without numba``: the same by torch operations, where numba is there.
 - ``plain``: E written with torch operations, differentiated by autograd. Same value, same gradient (checked).
 - ``normal consistency``: PyTorch3D's formula, the mean of 1 - cos over edges, likewise. Another energy of the
   same normals, without lengths: what a user of that library pays.
 
-The three take turns within every repeat, so that whatever else the machine does meets them alike. Times are
+They take turns within every repeat, so that whatever else the machine does meets them alike. Times are
 given as the smallest and the median of the repeats, ratios as ratio of the smallest and median of the ratios
-within a repeat.
+within a repeat. ``--clock processor`` counts processor time of all threads, for a machine that does other things.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import math
 import os
 import platform
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -33,9 +35,11 @@ import torch
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair.energies import _normal_variation_compiled as compiled
 from torchfair.energies import normal_variation
 
 Energy = Callable[[Tensor], Tensor]
+Clock = Callable[[], float]
 
 
 def shaken_torus(vertex_count: int, seed: int = 0) -> tuple[Tensor, Topology]:
@@ -83,18 +87,31 @@ def normal_consistency(topology: Topology) -> Energy:
     return energy
 
 
-def run(energy: Energy, vertices: Tensor) -> tuple[float, float, Tensor]:
+def without_numba(topology: Topology) -> Energy:
+    """E by torch operations, whatever is installed."""
+
+    def energy(vertices: Tensor) -> Tensor:
+        fewest, compiled.FEWEST_FACES = compiled.FEWEST_FACES, sys.maxsize
+        try:
+            return normal_variation(vertices, topology)
+        finally:
+            compiled.FEWEST_FACES = fewest
+
+    return energy
+
+
+def run(energy: Energy, vertices: Tensor, clock: Clock = time.perf_counter) -> tuple[float, float, Tensor]:
     """Seconds of forward and backward, value and gradient."""
     variable = vertices.clone().requires_grad_()
-    start = time.perf_counter()
+    start = clock()
     value = energy(variable)
     value.backward()  # type: ignore[no-untyped-call]
-    seconds = time.perf_counter() - start
+    seconds = clock() - start
     assert variable.grad is not None
     return seconds, value.item(), variable.grad
 
 
-def measure(vertex_count: int, dtype: torch.dtype, repeats: int) -> dict[str, object]:
+def measure(vertex_count: int, dtype: torch.dtype, repeats: int, clock: Clock) -> dict[str, object]:
     vertices, topology = shaken_torus(vertex_count)
     vertices = vertices.to(dtype)
     energies: dict[str, Energy] = {
@@ -102,6 +119,8 @@ def measure(vertex_count: int, dtype: torch.dtype, repeats: int) -> dict[str, ob
         "plain": plain_formula(topology),
         "normal consistency": normal_consistency(topology),
     }
+    if compiled.compiled_serves(vertices, None, topology):
+        energies["without numba"] = without_numba(topology)
     _, value, gradient = run(energies["torchfair"], vertices)
     _, expected, expected_gradient = run(energies["plain"], vertices)
     difference = (gradient - expected_gradient).abs().max().item() / expected_gradient.abs().max().item()
@@ -111,7 +130,7 @@ def measure(vertex_count: int, dtype: torch.dtype, repeats: int) -> dict[str, ob
     times: dict[str, list[float]] = {name: [] for name in energies}
     for _ in range(repeats):
         for name, energy in energies.items():
-            times[name].append(1e3 * run(energy, vertices)[0])
+            times[name].append(1e3 * run(energy, vertices, clock)[0])
     rows = {}
     for name, own in times.items():
         ratios = [other / mine for other, mine in zip(own, times["torchfair"], strict=True)]
@@ -154,14 +173,17 @@ def main() -> None:
     parser.add_argument("--vertices", type=int, nargs="+", default=[50_000, 200_000])
     parser.add_argument("--threads", type=int, nargs="+", default=[2], help="thread counts to measure with, in turn")
     parser.add_argument("--dtype", choices=["float64", "float32"], default="float64")
+    parser.add_argument("--clock", choices=["wall", "processor"], default="wall")
     parser.add_argument("--repeats", type=int, default=20)
     parser.add_argument("--json", type=Path, help="file to write the results to")
     arguments = parser.parse_args()
+    clock = time.process_time if arguments.clock == "processor" else time.perf_counter
     results = []
     for threads in arguments.threads:
         torch.set_num_threads(threads)
         for count in arguments.vertices:
-            result = {"threads": threads, **measure(count, getattr(torch, arguments.dtype), arguments.repeats)}
+            measured = measure(count, getattr(torch, arguments.dtype), arguments.repeats, clock)
+            result = {"threads": threads, "clock": arguments.clock, **measured}
             print(report(result, threads), flush=True)
             results.append(result)
     if arguments.json:

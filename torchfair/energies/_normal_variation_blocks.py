@@ -125,7 +125,7 @@ def tables_of(topology: Topology) -> Tables:
 
 def _build(topology: Topology) -> tuple[Block, ...]:
     limit = faces_per_block(topology.corners.is_cpu)
-    neighbours = _neighbours(topology)
+    neighbours = neighbours_of(topology)
     blocks = []
     begin = 0
     for size, (faces, corners) in topology.faces_by_size.items():
@@ -149,7 +149,7 @@ def _build(topology: Topology) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _neighbours(topology: Topology) -> Tensor:
+def neighbours_of(topology: Topology) -> Tensor:
     """Place of the face behind each side, (H,) with 32 bits."""
     twins = topology.twins
     own = torch.arange(twins.shape[0], device=topology.device)

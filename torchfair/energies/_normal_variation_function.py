@@ -15,6 +15,7 @@ from ..geometry import dual_edge_lengths, edge_lengths
 from ..geometry._unit import in_their_units
 from ..topology import Topology
 from ._normal_variation_blocks import faces_per_block, tables_of
+from ._normal_variation_compiled import compiled_energy_and_gradient, compiled_serves
 from ._normal_variation_kernel import energy_and_gradient
 
 
@@ -162,10 +163,14 @@ def _evaluate(
     vertices: Tensor, edge_weights: Tensor | None, topology: Topology, with_gradient: bool
 ) -> tuple[Tensor, Tensor]:
     """E (*batch,) and its gradient (*batch, V, 3), or an empty tensor in its place."""
-    batch, count, meshes = vertices.shape[:-2], topology.num_vertices, tables_of(topology).mesh_shape
+    batch, count = vertices.shape[:-2], topology.num_vertices
     flat = vertices.reshape(batch.numel(), count, 3)
-    energy = flat.new_empty(flat.shape[0], *meshes)
     gradient = flat.new_empty(flat.shape) if with_gradient else None
+    if compiled_serves(flat, edge_weights, topology):
+        energy = compiled_energy_and_gradient(flat, topology, gradient)
+        return energy.view(batch), flat.new_empty(0) if gradient is None else gradient.view(vertices.shape)
+    meshes = tables_of(topology).mesh_shape
+    energy = flat.new_empty(flat.shape[0], *meshes)
     if edge_weights is not None:
         rows = batch if edge_weights.dim() > 1 else torch.Size()
         edge_weights = edge_weights.expand(*rows, -1).reshape(rows.numel(), topology.num_interior_edges)
