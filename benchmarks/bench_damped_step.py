@@ -42,7 +42,7 @@ from torch import Tensor
 from torus_problem import torus_problem
 
 import torchfair
-from torchfair.linear import ConjugateGradients, Factor, RslabDirect, ScipyDirect, Solution
+from torchfair.linear import ConjugateGradients, Factor, LinearSolver, PardisoDirect, RslabDirect, ScipyDirect, Solution
 from torchfair.projection import GuidedProjection, IterationRecord, ProjectionSettings
 from torchfair.projection.linear_system import LinearSystem
 from torchfair.projection.proposal import descend
@@ -52,7 +52,8 @@ PARTS = ("jacobian", "assembly", "factor", "solve", "merit", "other", "whole")
 COLUMNS = (*PARTS, "corrected")
 TARGETS = {("rslab", 2784): 60.0, ("rslab", 10000): 250.0}  # milliseconds of the whole step
 TARGETS |= {("cg", 2784): 20.0, ("cg", 10000): 120.0, ("cg", 50000): 300.0, ("cg", 200000): 3000.0}
-LARGEST = {"rslab": 60_000, "scipy": 12_000, "cg": 10**9}  # sizes at which each solver is tried
+SOLVERS = {"rslab": RslabDirect, "pardiso": PardisoDirect, "scipy": ScipyDirect, "cg": ConjugateGradients}
+LARGEST = {"rslab": 60_000, "pardiso": 60_000, "scipy": 12_000, "cg": 10**9}  # sizes at which each solver is tried
 
 Seconds = tuple[float, float]  # wall, processor
 
@@ -104,7 +105,7 @@ class Clock:
 class Timed:
     """A linear solver whose assembly, factorisation and substitution are timed apart."""
 
-    def __init__(self, solver: RslabDirect | ScipyDirect | ConjugateGradients, clock: Clock) -> None:
+    def __init__(self, solver: LinearSolver, clock: Clock) -> None:
         self.name, self.inexact, self.prepare = solver.name, solver.inexact, solver.prepare
         self._solver, self._clock = solver, clock
 
@@ -139,7 +140,7 @@ class Case:
         self.clock = Clock()
         self.runs: list[list[dict[str, Seconds]]] = []
         self.inner: list[int] = []
-        solver = Timed({"rslab": RslabDirect, "scipy": ScipyDirect, "cg": ConjugateGradients}[name](), self.clock)
+        solver = Timed(SOLVERS[name](), self.clock)
         self.start, terms = torus_problem(size)
         begin = now()
         self.problem = GuidedProjection(self.start, terms, solver=solver)
@@ -225,7 +226,7 @@ def report(row: dict[str, object]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", type=int, nargs="+", default=[2784, 10000, 50000, 200000])
-    parser.add_argument("--solvers", nargs="+", default=["rslab", "scipy", "cg"], choices=["rslab", "scipy", "cg"])
+    parser.add_argument("--solvers", nargs="+", default=list(SOLVERS), choices=list(SOLVERS))
     parser.add_argument("--threads", type=int, default=torch.get_num_threads())
     parser.add_argument("--steps", type=int, default=6, help="damped steps in each run (default: %(default)s)")
     parser.add_argument("--repeats", type=int, default=5, help="runs of each case (default: %(default)s)")
@@ -238,7 +239,9 @@ def main() -> None:
     rows = []
     for size in options.sizes:
         names = [name for name in options.solvers if size <= LARGEST[name]]
-        cases = [Case(name, size, options.steps) for name in names if name != "rslab" or RslabDirect.available()]
+        cases = [
+            Case(name, size, options.steps) for name in names if getattr(SOLVERS[name], "available", lambda: True)()
+        ]
         for _ in range(options.repeats):
             for case in cases:
                 if case.name != "scipy" or not case.runs:  # slow, so once is enough

@@ -8,7 +8,7 @@ import torch
 from helpers import DOUBLE, wavy_grid
 from torch import Tensor
 
-from torchfair.linear import ConjugateGradients, DenseQR, RslabDirect, ScipyDirect
+from torchfair.linear import ConjugateGradients, DenseQR, PardisoDirect, RslabDirect, ScipyDirect
 from torchfair.projection import ElementTerm, SmoothAbsolute, portions
 from torchfair.projection.layout import Layout
 from torchfair.projection.linear_system import LinearSystem
@@ -146,7 +146,7 @@ def test_normal_pattern_is_sorted_lower_triangle_with_diagonal_first() -> None:
 
 
 SOLVERS = [DenseQR(), ScipyDirect(), ConjugateGradients(max_iterations=2000)]
-SOLVERS += [RslabDirect()] if RslabDirect.available() else []
+SOLVERS += [solver() for solver in (RslabDirect, PardisoDirect) if solver.available()]
 
 
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda s: s.name)

@@ -15,5 +15,7 @@ from .direct import SparseDirect as SparseDirect
 from .lower_triangle import LowerTriangle as LowerTriangle
 from .matrix import MatrixSystem as MatrixSystem
 from .matrix import factorise as factorise
+from .mixed_precision import MixedPrecision as MixedPrecision
+from .pardiso_direct import PardisoDirect as PardisoDirect
 from .rslab_direct import RslabDirect as RslabDirect
 from .scipy_direct import ScipyDirect as ScipyDirect

@@ -13,12 +13,10 @@ import numpy as np
 
 from .._threads import allowed_threads
 from ..errors import SingularSystemError
-from .direct import TIGHTEST, SparseDirect, Substitution
 from .lower_triangle import LowerTriangle
+from .mixed_precision import MixedPrecision, Solve
 
-_REFINEMENTS = 8
 _SMALLEST_RACE = 5_000  # unknowns
-_LEAST_PROGRESS = 0.1  # of a refinement that is worth another one
 
 
 def _load() -> ModuleType | None:
@@ -39,12 +37,10 @@ def _load() -> ModuleType | None:
 _load()  # while the thread is most likely the main one; takes two milliseconds
 
 
-class RslabDirect(SparseDirect):
+class RslabDirect(MixedPrecision):
     """Supernodal ``L D L^T`` (``pip install torchfair[direct]``); several times faster than SuperLU.
 
-    The factor is computed in single precision, in half the time, and its solution refined with the matrix in
-    double precision until the remainder is below 1e-12 of the right-hand side, or the accuracy asked for. Where
-    that fails, the factor is computed again in double precision, and so it stays until the pattern changes.
+    The factor is computed in single precision, in half the time, and its solution refined, see ``MixedPrecision``.
 
     Factors whose inertia is not positive are refused, so that an indefinite matrix raises the damping. Threads are as
     many as torch has (``torch.set_num_threads``, ``OMP_NUM_THREADS``).
@@ -57,13 +53,11 @@ class RslabDirect(SparseDirect):
         """Whether the package is installed, and imported or importable in this thread (it must be the main one)."""
         return _load() is not None
 
-    def analyse(self, lower: LowerTriangle) -> None:
+    def order(self, lower: LowerTriangle) -> None:
         """Orders and analyses the pattern."""
         rslab = _load()
         if rslab is None:
             raise RuntimeError("rslab is not installed, or was not imported in the main thread: import torchfair there")
-        self.single = True
-        self._places = lower
         ones = np.ones(lower.rows.size)
         ones[lower.diagonal] = lower.size
         # Nested dissection goes down to small parts, which saves a fifth of the work per factor. It takes part in the
@@ -79,57 +73,16 @@ class RslabDirect(SparseDirect):
             threads=("auto", allowed_threads()),
         )
 
-    def factor(self, values: np.ndarray) -> Substitution:
-        """Factors a matrix of the pattern; see ``SparseDirect``."""
-        if not self.single:
-            return self._double(values)
-        try:
-            factor = self._numeric(values, factor_dtype="float32")
-        except SingularSystemError:  # perhaps only to single precision
-            return self._double(values)
-        exact: list[Substitution] = []
-
-        def substitute(right: np.ndarray, accuracy: float) -> np.ndarray:
-            solution = None if exact else self._refine(factor, values, right, min(accuracy, TIGHTEST))
-            if solution is None:
-                if not exact:
-                    exact.append(self._double(values))
-                return exact[0](right, accuracy)
-            return solution
-
-        return substitute
-
-    def _double(self, values: np.ndarray) -> Substitution:
-        factor = self._numeric(values)
-        self.single = False
-        return lambda right, accuracy: _substitute(factor, right)
-
-    def _numeric(self, values: np.ndarray, **settings: str) -> Any:
+    def numeric(self, values: np.ndarray, single: bool) -> Solve:
+        """See ``MixedPrecision``."""
+        settings = {"factor_dtype": "float32"} if single else {}
         try:
             factor = self._symbolic.factor(values, threads=("auto", allowed_threads()), **settings)
         except (RuntimeError, ValueError) as error:
             raise SingularSystemError(f"rslab: {error}") from None
-        if factor.inertia[0] != self._places.size:
+        if factor.inertia[0] != self.places.size:
             raise SingularSystemError(f"the matrix is not positive definite (inertia {factor.inertia})")
-        return factor
-
-    def _refine(self, factor: Any, values: np.ndarray, right: np.ndarray, accuracy: float) -> np.ndarray | None:
-        """Solution by a factor in single precision; None if it stays inaccurate."""
-        lower, diagonal = self._places.matrix(values), values[self._places.diagonal]
-        diagonal = diagonal if right.ndim == 1 else diagonal[:, None]
-        solution: np.ndarray = np.zeros_like(right)
-        remainder, target = right, accuracy * np.linalg.norm(right, axis=0)
-        for _ in range(1 + _REFINEMENTS):
-            before = np.linalg.norm(remainder, axis=0)
-            solution = solution + _substitute(factor, remainder)
-            remainder = right - (lower @ solution + lower.T @ solution - diagonal * solution)
-            size = np.linalg.norm(remainder, axis=0)
-            unfinished = ~(size <= target)
-            if not unfinished.any():
-                return solution
-            if not (size <= _LEAST_PROGRESS * before)[unfinished].all():
-                return None
-        return None
+        return lambda right: _substitute(factor, right)
 
 
 def _substitute(factor: Any, right: np.ndarray) -> np.ndarray:
