@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numpy as np
 import pytest
+import scipy.sparse as sp
 import torch
 from torch import Tensor
 
 from torchfair.errors import SingularSystemError
-from torchfair.linear import RslabDirect
+from torchfair.linear import LowerTriangle, MixedPrecision, RslabDirect, factorise
 from torchfair.projection import ElementTerm, GuidedProjection
 
-pytestmark = pytest.mark.skipif(not RslabDirect.available(), reason="rslab is an extra")
+with_rslab = pytest.mark.skipif(not RslabDirect.available(), reason="rslab is an extra")
 LENGTH = 400
 
 
@@ -42,6 +46,7 @@ def relative_remainder(holding: float) -> tuple[float, RslabDirect]:
     return float(left.norm() / system.gradient.norm()), solver
 
 
+@with_rslab
 @pytest.mark.parametrize("holding", [1.0, 1e-2, 1e-4])
 def test_single_precision_suffices_for_good_matrices(holding: float) -> None:
     remainder, solver = relative_remainder(holding)
@@ -49,6 +54,7 @@ def test_single_precision_suffices_for_good_matrices(holding: float) -> None:
     assert remainder < 1e-5
 
 
+@with_rslab
 @pytest.mark.parametrize("holding", [1e-9, 1e-11])
 def test_double_precision_takes_over_for_bad_matrices(holding: float) -> None:
     remainder, solver = relative_remainder(holding)
@@ -56,6 +62,7 @@ def test_double_precision_takes_over_for_bad_matrices(holding: float) -> None:
     assert remainder < 1e-5
 
 
+@with_rslab
 def test_a_singular_matrix_is_refused_in_both_precisions() -> None:
     problem = chain(1.0)
     system = problem.structure.linearise({"x": torch.zeros(LENGTH, 1, dtype=torch.float64)})
@@ -63,3 +70,40 @@ def test_a_singular_matrix_is_refused_in_both_precisions() -> None:
     solver.prepare(problem.structure)
     with pytest.raises(SingularSystemError):
         solver.factorise(system, torch.full((LENGTH,), -100.0, dtype=torch.float64))
+
+
+class Rough(MixedPrecision):
+    """Dense inverses; the one in single precision is wrong by a factor."""
+
+    name = "rough"
+
+    def __init__(self, factor: float) -> None:
+        self.factor_of_single, self.calls = factor, []
+
+    def order(self, lower: LowerTriangle) -> None:
+        self.calls.append("order")
+
+    def numeric(self, values: np.ndarray, single: bool) -> Callable[[np.ndarray], np.ndarray]:
+        lower = self.places.matrix(values).toarray()
+        inverse = np.linalg.inv(lower + lower.T - np.diag(np.diag(lower)))
+        self.calls.append("single" if single else "double")
+        return lambda right: (self.factor_of_single if single else 1.0) * inverse @ right
+
+
+@pytest.mark.parametrize(
+    ("factor", "calls"), [(0.99, ["single"]), (0.5, ["single", "double"]), (0.02, ["single", "double"])]
+)
+@pytest.mark.parametrize("columns", [(), (2,)])
+def test_refinement_that_hardly_gains_gives_way_to_double_precision(
+    factor: float, calls: list[str], columns: tuple[int, ...]
+) -> None:
+    chain = sp.diags([[-1.0] * 9, [2.5] * 10, [-1.0] * 9], [-1, 0, 1], format="csr")
+    right = torch.randn(10, *columns, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    solver = Rough(factor)
+    for _ in range(2):
+        solution = factorise(chain, solver=solver).solve(right, 1e-2).values
+        left = right - torch.from_numpy(chain @ solution.numpy())
+        assert float(left.norm()) <= 1e-12 * float(right.norm())
+    # The analysis is kept; double precision is, too.
+    assert solver.calls == ["order", *calls, calls[-1]]
+    assert solver.single == (calls[-1] == "single")

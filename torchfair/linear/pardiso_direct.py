@@ -95,7 +95,7 @@ class _Handle:
     def __init__(self, lower: LowerTriangle, dtype: type[np.floating[Any]]) -> None:
         self.dtype, self.lock = dtype, threading.Lock()
         self.values: np.ndarray | None = None
-        self._size = lower.size
+        self._library, self._size = _library(), lower.size
         self._offsets, self._rows = lower.offsets.astype(np.int32), lower.rows.astype(np.int32)
         self._settings = np.zeros(64, np.int32)
         self._settings[[0, _ORDERING, _PRECISION, _INDICES]] = (
@@ -108,7 +108,7 @@ class _Handle:
         ones: np.ndarray = np.ones(lower.rows.size, dtype)
         ones[lower.diagonal] = lower.size
         self._call(_ANALYSE, ones)
-        weakref.finalize(self, _release, self._pointers, self._size, self._settings)
+        weakref.finalize(self, _release, self._library, self._pointers, self._size, self._settings)
 
     def factor(self, values: np.ndarray) -> None:
         """Factors the lower triangle with values of the dtype."""
@@ -126,14 +126,13 @@ class _Handle:
         return np.ascontiguousarray(solution, dtype=np.float64)
 
     def _call(self, phase: int, values: Any, right: Any = None, solution: Any = None) -> None:
-        library = _library()
-        before = library.MKL_Set_Num_Threads_Local(allowed_threads())
+        before = self._library.MKL_Set_Num_Threads_Local(allowed_threads())
         try:
             number = 1 if right is None or right.ndim == 1 else right.shape[1]
             arrays = values, self._offsets, self._rows, right, solution
-            error = _pardiso(self._pointers, self._size, self._settings, phase, number, arrays)
+            error = _pardiso(self._library, self._pointers, self._size, self._settings, phase, number, arrays)
         finally:
-            library.MKL_Set_Num_Threads_Local(before)
+            self._library.MKL_Set_Num_Threads_Local(before)
         if error == -4:
             raise SingularSystemError(f"pardiso: {_ERRORS[error]}")
         if error:
@@ -141,7 +140,13 @@ class _Handle:
 
 
 def _pardiso(
-    pointers: np.ndarray, size: int, settings: np.ndarray, phase: int, number: int, arrays: tuple[Any, ...]
+    library: Any,
+    pointers: np.ndarray,
+    size: int,
+    settings: np.ndarray,
+    phase: int,
+    number: int,
+    arrays: tuple[Any, ...],
 ) -> int:
     """One call of MKL's routine; its error code."""
     values, offsets, rows, right, solution = (None if a is None else ctypes.c_void_p(a.ctypes.data) for a in arrays)
@@ -150,13 +155,13 @@ def _pardiso(
     )
     order, given = (ctypes.c_void_p(a.ctypes.data) for a in (np.zeros(size, np.int32), settings))
     refer, handle = ctypes.byref, ctypes.c_void_p(pointers.ctypes.data)
-    _library().pardiso(
+    library.pardiso(
         handle, refer(one), refer(one), refer(kind), refer(phase_), refer(size_), values, offsets, rows, order,
         refer(number_), given, refer(quiet), right, solution, refer(error),
     )  # fmt: skip
     return error.value
 
 
-def _release(pointers: np.ndarray, size: int, settings: np.ndarray) -> None:
+def _release(library: Any, pointers: np.ndarray, size: int, settings: np.ndarray) -> None:
     """Gives the memory of an analysis and its factor back."""
-    _pardiso(pointers, size, settings, _RELEASE, 1, (None, None, None, None, None))
+    _pardiso(library, pointers, size, settings, _RELEASE, 1, (None, None, None, None, None))
