@@ -108,6 +108,16 @@ def test_slivers(height: float, compiled: pytest.MonkeyPatch) -> None:
     same(*both_ways(vertices, topology, compiled))
 
 
+def test_triangles_whose_areas_nearly_vanish(compiled: pytest.MonkeyPatch) -> None:
+    vertices, topology = dented_sphere()
+    tiny = 3e-78 * torch.tensor([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=DOUBLE)
+    faces = torch.cat([topology.corners.view(-1, 3), topology.num_vertices + torch.tensor([[0, 1, 2], [0, 3, 1]])])
+    together = torch.cat([vertices, tiny])
+    fast, slow = both_ways(together, Topology.from_faces(faces), compiled)
+    same(fast, slow)
+    torch.testing.assert_close(fast[1][-4:], slow[1][-4:], rtol=1e-10, atol=0.0)
+
+
 def test_no_number_stays_none(compiled: pytest.MonkeyPatch) -> None:
     vertices, topology = dented_sphere()
     vertices[3, 1] = torch.nan
@@ -155,6 +165,7 @@ def test_what_it_does_not_serve(compiled: pytest.MonkeyPatch) -> None:
     assert not serves(vertices, weights, topology)
     assert not serves(quads[0], None, quads[1])
     assert not serves(vertices.to("meta"), None, topology)
+    assert not serves(torch.cat([vertices, vertices]), None, Topology.join([topology, topology]))
     compiled.setattr(compiled_module, "is_installed", lambda: False)
     assert not serves(vertices, None, topology)
 
