@@ -21,15 +21,16 @@ from .integers import split_integers
 from .lattice import Lattice
 from .off_lines import off_the_lines
 from .relaxation import loosened, stretched
-from .seamless_map import MapProblem, SeamlessMap
+from .seamless_map import MapProblem, SeamlessMap, badness
 from .seams import Seams, find_seams
 from .surface import DesignSurface
 from .tracing import Cells, trace_cells
-from .untangling import untangled
+from .untangling import is_hopeless, untangled
 from .verification import shape_of, verified_topology, verify_creases
 
 _ANISOTROPY = 30.0  # of the map: 1 triples the angles to directions, 300 wins little and stretches edges
 _UNTANGLED = 2  # maps, the best first
+_NEARLY = 16  # triangles turned over and branches that are left: with more no second map is tried
 _SHORTEST_RUN = 1.5  # spacings
 _APART = 1.5  # spacings
 
@@ -59,11 +60,14 @@ class FailedAttemptError(MeshError):
     Attributes:
         vertex: number of a vertex of the surface that was given where it went wrong, -1 if unknown.
         place: where that is.
+        hopeless: whether so much was wrong that a spacing a little different will not do, nor one crease less.
     """
 
-    def __init__(self, message: str, vertex: int = -1, place: Floats | None = None) -> None:
+    def __init__(
+        self, message: str, vertex: int = -1, place: Floats | None = None, *, hopeless: bool = False
+    ) -> None:
         super().__init__(message)
-        self.vertex, self.place = vertex, place
+        self.vertex, self.place, self.hopeless = vertex, place, hopeless
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,26 +160,27 @@ def _map(
     )
     wanted, problem = problem.density, stretched(problem)
     best = _untangled(problem)
-    looser = problem if best.is_sound else loosened(problem, wanted)
-    if looser is not problem:
+    if not best.is_sound and not is_hopeless(best) and (looser := loosened(problem, wanted)) is not problem:
         best = _untangled(looser)
     if best.is_sound:
         return best
     vertices = best.branches if len(best.branches) else frames.triangles[best.flips[0]]
-    raise _failure(surface, int(vertices[0]))
+    raise _failure(surface, int(vertices[0]), is_hopeless(best))
 
 
 def _untangled(problem: MapProblem) -> SeamlessMap:
-    """The first map that is one to one near every point, or the last that was tried."""
-    for candidate in problem.candidates()[:_UNTANGLED]:
+    """The first map that is one to one near every point, or the last that was tried; a hopeless one as it is."""
+    candidates = problem.candidates()
+    found = candidates[0]
+    for candidate in [] if is_hopeless(found) else candidates[:_UNTANGLED]:
         found = untangled(problem, candidate)
-        if found.is_sound:
+        if found.is_sound or badness(found)[0] > _NEARLY:
             break
     return found
 
 
-def _failure(surface: DesignSurface, vertex: int) -> FailedAttemptError:
+def _failure(surface: DesignSurface, vertex: int, hopeless: bool) -> FailedAttemptError:
     place = surface.frames.points[vertex]
     known = np.flatnonzero(surface.numbers.numpy() >= 0)
     nearest = known[np.argmin(((surface.frames.points[known] - place) ** 2).sum(1))]
-    return FailedAttemptError("triangles are turned over", int(surface.numbers[nearest]), place)
+    return FailedAttemptError("triangles are turned over", int(surface.numbers[nearest]), place, hopeless=hopeless)

@@ -16,6 +16,7 @@ from ..fields import (
     merge_singularities,
     vertex_charges,
 )
+from ..fields.direction_field import WEAK
 from ..fields.frames import Floats
 from ..fields.matchings import QUARTER
 from .creases import Creases, crease_pull
@@ -36,7 +37,8 @@ def combed(
     """The mesh cut open, with a field of directions.
 
     Crosses are tried for directions, too: the larger and the smaller curvature change places where the surface has an
-    umbilic line, crosses go on. They will do if one of their two directions never comes back as the other.
+    umbilic line, crosses go on. They will do if one of their two directions never comes back as the other. Directions
+    that creases at right angles pull both ways, as on a box, run lengthwise where that has fewer singular points.
 
     Args:
         frames: of the triangles.
@@ -48,12 +50,16 @@ def combed(
         angle: between chains of creases and the field, up to which it follows them.
     """
     stay = None if creases is None else creases.corners
+    has_creases = creases is not None and bool(creases.chains)
     tried: tuple[Symmetry, ...] = (4, 2) if symmetry == 2 else (4,)
     for of in tried:
-        angles = _field(frames, directions, smoothing, of, creases, angle)
-        matched = matchings(frames, angles, of)
-        angles, matched = merge_singularities(frames, angles, matched, directions, smoothing, merging, of, stay)
-        graph = cut_open(frames, angles, matched, vertex_charges(frames, angles, matched))
+        graphs = []
+        for lengthwise in (False, True) if of == 2 and has_creases else (False,):
+            angles = _field(frames, directions, smoothing, of, creases, angle, lengthwise)
+            matched = matchings(frames, angles, of)
+            angles, matched = merge_singularities(frames, angles, matched, directions, smoothing, merging, of, stay)
+            graphs.append(cut_open(frames, angles, matched, vertex_charges(frames, angles, matched)))
+        graph = min(graphs, key=lambda graph: int(np.abs(graph.charges).sum()))
         if symmetry == 4 or not (graph.quarters % 2).any():
             break
     if symmetry == 4:
@@ -70,12 +76,14 @@ def _field(
     symmetry: Symmetry,
     creases: Creases | None,
     angle: float,
+    lengthwise: bool,
 ) -> Floats:
-    """The field that follows the creases which it nearly follows by itself."""
+    """The field that follows the creases which it nearly follows by itself, or by the longest axis of the surface."""
     if creases is None or not creases.chains:
         return direction_field(frames, directions, smoothing, symmetry)
     pull, chains = crease_pull(frames, creases)
-    field = direction_field(frames, directions, smoothing, symmetry, pull)
+    weak = _along_the_longest_axis(frames) if lengthwise else pull
+    field = direction_field(frames, directions, smoothing, symmetry, weak)
     turns = np.rint((field[pull.faces] - pull.angles) / QUARTER)
     off = np.abs(field[pull.faces] - pull.angles - turns * QUARTER)
     count = np.bincount(chains)
@@ -84,3 +92,12 @@ def _field(
         return field
     firm = Pull(pull.faces, pull.angles + turns * QUARTER, np.where(follows[chains], _FIRM, pull.weights))
     return direction_field(frames, directions, smoothing, symmetry, firm)
+
+
+def _along_the_longest_axis(frames: FaceFrames) -> Pull:
+    """Directions of the axis of least inertia in all faces, with small weights."""
+    apart = frames.centres - frames.areas @ frames.centres / frames.areas.sum()
+    axis = np.linalg.eigh(apart.T @ (frames.areas[:, None] * apart))[1][:, -1]
+    faces = np.arange(len(apart))
+    seen = frames.seen(np.broadcast_to(axis, apart.shape), faces)
+    return Pull(faces, np.angle(seen), WEAK * np.abs(seen) ** 2)

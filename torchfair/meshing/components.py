@@ -172,7 +172,7 @@ def mesh_components(
         lattices: of the components.
         spacing: length of edges.
         settings: of the meshes.
-        first: number of the plan to begin with for every component, by default what was asked for.
+        first: number of the plan of every component that gave a mesh with another spacing; by default none has.
 
     Raises:
         NoMeshError: if one has no valid mesh.
@@ -183,7 +183,7 @@ def mesh_components(
     parts = surface.parts if sizes is None else surface.sized(sizes.field)
     for number, (part, directions) in enumerate(zip(parts, surface.fields, strict=True)):
         smoothing = settings.smoothing_length(surface.fits[number].rings)
-        begin = 0 if first is None else first[number]
+        begin = None if first is None else first[number]
         mesh, words, plan = mesh_component(part, directions, lattices[number], spacing, smoothing, settings, begin)
         taken.append(plan)
         if words:

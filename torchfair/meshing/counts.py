@@ -73,7 +73,7 @@ def next_spacing(tried: list[tuple[float, int]], count: int) -> float:
     """
     more, fewer = ([pair for pair in tried if (pair[1] > count) == side] for side in (True, False))
     if not (more and fewer):
-        spacing, found = min(tried, key=lambda pair: abs(math.log(pair[1] / count)))
+        spacing, found = min(reversed(tried), key=lambda pair: abs(math.log(pair[1] / count)))  # of equals the last
         return spacing * math.sqrt(found / count)
     finer, many = min(more, key=lambda pair: (pair[1], -pair[0]))
     coarser, few = max(fewer, key=lambda pair: (pair[1], -pair[0]))

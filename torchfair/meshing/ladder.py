@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,20 @@ class NoMeshError(MeshError):
         self.vertex = vertex
 
 
+class Rung(NamedTuple):
+    """A plan, how in words it differs from what was asked for, and by which factors."""
+
+    plan: Plan
+    words: str
+    scale: float
+    smoother: float
+
+    @property
+    def kind(self) -> tuple[float, bool, bool]:
+        """What it has in common with plans of a spacing a little different."""
+        return self.smoother, self.plan.align, self.plan.creases
+
+
 def mesh_component(
     surface: DesignSurface,
     directions: Directions,
@@ -45,7 +60,7 @@ def mesh_component(
     spacing: float,
     smoothing: float,
     settings: MeshingSettings,
-    first: int = 0,
+    first: int | None = None,
 ) -> tuple[PieceMesh, str, int]:
     """The mesh of a component by the first plan that gives a valid one, what was changed, and the plan's number.
 
@@ -56,7 +71,7 @@ def mesh_component(
         spacing: length of edges.
         smoothing: of directions, over the spacing.
         settings: of the mesh.
-        first: number of the plan to begin with.
+        first: number of the plan to begin with, which gave a mesh with another spacing; then spacings are not changed.
 
     Raises:
         NoMeshError: if none does.
@@ -88,24 +103,36 @@ def mesh_component(
         merging, sharp = settings.merging * spacing, creases(spacing, kept)
         return combed(triangles.frames, carried, lattice.symmetry, smoothing, merging, sharp, settings.boundary_angle)
 
-    tried = enumerate(plans(spacing, smoothing, settings, creased))
-    for place, (plan, words) in itertools.islice(tried, first, None):
+    hopeless: set[tuple[float, bool, bool]] = set()
+    for place, rung in _from(first, list(plans(spacing, smoothing, settings, creased))):
+        plan = rung.plan
         limit = settings.time_limit * (_SHARE if plan.creases else 1.0)
-        if number and (not settings.fallback or time.process_time() - began > limit):
+        late = time.process_time() - began > limit
+        if number and (not settings.fallback or late or rung.kind in hopeless):
             continue
         for _ in range(1 + _RETRIES * (settings.fallback and plan.creases and plan.align)):
             number += 1
             try:
                 field, sharp = graph(plan.spacing, plan.smoothing, plan.creases), creases(plan.spacing, plan.creases)
                 triangles = finer(plan.spacing, plan.creases)[0]
-                return attempt(triangles, sharp, field, lattice, plan, settings), _in_words(plan, words), place
+                return attempt(triangles, sharp, field, lattice, plan, settings), _in_words(plan, rung.words), place
             except FailedAttemptError as error:
                 failure = error if failure is None or failure.vertex < 0 else failure
-                if error.place is None:
+                if error.hopeless:
+                    hopeless.add(rung.kind)
+                if error.place is None or error.hopeless:
                     break
                 plan = replace(plan, apart=np.concatenate([plan.apart, error.place[None]]))
     assert failure is not None
     raise NoMeshError(_refusal(failure, number), failure.vertex)
+
+
+def _from(first: int | None, rungs: list[Rung]) -> Iterator[tuple[int, Rung]]:
+    """Numbers of plans and plans: all of them, or those from the first on that differ from it in neither size."""
+    begin = rungs[first or 0]
+    for place, rung in itertools.islice(enumerate(rungs), first, None):
+        if first is None or (rung.scale, rung.plan.creases) == (begin.scale, begin.plan.creases):
+            yield place, rung
 
 
 def _in_words(plan: Plan, words: str) -> str:
@@ -115,8 +142,8 @@ def _in_words(plan: Plan, words: str) -> str:
 
 def plans(
     spacing: float, smoothing: float, settings: MeshingSettings, creased: bool = False
-) -> Iterator[tuple[Plan, str]]:
-    """What is tried, and how that differs from what was asked for; without the creases at last, where there are any."""
+) -> Iterator[Rung]:
+    """What is tried, one after the other; without the creases at last, where there are any."""
     for kept in (True, False) if creased else (False,):
         can_align = settings.align_boundary or kept
         curves = "boundary and creases" if kept else "boundary"
@@ -130,7 +157,7 @@ def plans(
                         f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces" if scale != 1 else "",
                     ]
                     plan = Plan(spacing * scale, spacing * smoothing * smoother, align, kept)
-                    yield plan, ", ".join(filter(None, words))
+                    yield Rung(plan, ", ".join(filter(None, words)), scale, smoother)
 
 
 def _refusal(failure: FailedAttemptError, number: int) -> str:

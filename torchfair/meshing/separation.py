@@ -19,7 +19,7 @@ _ROUNDS = 8
 
 
 def gaps(frames: FaceFrames, graph: CutGraph, seams: Seams, radius: float) -> sp.csr_matrix:
-    """(n, N) complex: differences of the values of two singular vertices, in one frame, by those of copies.
+    """(n, N) complex: differences of the values of two nodes, in one frame, by those of copies.
 
     Args:
         frames: of the triangles.
@@ -27,7 +27,7 @@ def gaps(frames: FaceFrames, graph: CutGraph, seams: Seams, radius: float) -> sp
         seams: its copies.
         radius: pairs that are farther from each other on the surface are left out; of many the nearest hundred stay.
     """
-    singular = np.flatnonzero(graph.charges)
+    singular = np.flatnonzero(graph.nodes)
     if len(singular) < 2:
         return sp.csr_matrix(np.zeros((0, len(seams.vertex)), complex))
     at = [np.flatnonzero((frames.triangles == vertex).any(1)) for vertex in singular]

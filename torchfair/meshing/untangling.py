@@ -17,7 +17,15 @@ _ROUNDS = 40
 _IDLE = 6  # rounds without progress
 _STEPS = 60  # of a round
 _ENOUGH = 0.02  # of the area wanted
+_NEARLY = 8  # triangles turned over and branches: only so few are worth a larger patch
+_HOPELESS = 40  # of them, or this share of all triangles, have never been turned back
+_HOPELESS_SHARE = 0.01
 _ALIGNMENT = 0.05  # weight of the least squares of the map beside the shape of triangles
+
+
+def is_hopeless(found: SeamlessMap) -> bool:
+    """Whether so much is turned over that untangling is not worth its time: whole numbers or creases are in the way."""
+    return badness(found)[0] > max(_HOPELESS, _HOPELESS_SHARE * len(found.areas))
 
 
 def untangled(problem: MapProblem, found: SeamlessMap) -> SeamlessMap:
@@ -29,15 +37,15 @@ def untangled(problem: MapProblem, found: SeamlessMap) -> SeamlessMap:
         sum_f A_f (|J|^2 + D^2 + 1) / chi(D),    chi(D) = (D + sqrt(eps^2 + D^2)) / 2,    D = det J,
 
     with ``J`` relative to the gradients wanted. ``eps`` falls as the least D rises: the energy becomes a
-    barrier.
+    barrier. Larger patches are tried only where little is left to turn back.
 
     Args:
         problem: whose free values may move.
         found: a map of it.
     """
     for rings in _RINGS:
-        if found.is_sound:
-            return found
+        if found.is_sound or (rings > _RINGS[0] and badness(found)[0] > _NEARLY):
+            break
         better = _Patch.around(problem, found, rings).solve()
         if badness(better) < badness(found):
             found = better
