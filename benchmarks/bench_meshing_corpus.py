@@ -39,6 +39,7 @@ from torchfair.triangulation import triangulate
 KINDS = ("quads", "triangles", "planar")
 LIMIT = 60
 _MANY = 3000  # triangles
+_FOLDED = 0.01  # of the faces may look the other way than the surface next to them, at sharp edges
 
 
 def height_field(height: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]) -> Mesh:
@@ -49,7 +50,7 @@ def height_field(height: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]) -
 
 
 def box(lines: int = 12) -> Mesh:
-    """A box of edges 1, 0.8 and 0.6 without creases' help: each side is a lattice cut into triangles."""
+    """A box of edges 1, 0.8 and 0.6: each side is a lattice cut into triangles."""
     steps = torch.linspace(-0.5, 0.5, lines + 1, dtype=torch.float64)
     x, y = (of.reshape(-1) for of in torch.meshgrid(steps, steps, indexing="ij"))
     at = torch.arange((lines + 1) ** 2).reshape(lines + 1, lines + 1)
@@ -106,7 +107,7 @@ def fault(vertices: torch.Tensor, topology: Topology, surface: Mesh) -> str:
     nearest = ReferenceSurface(surface[0], triangles).closest(face_centres(vertices, topology))
     ahead = (face_normals(vertices, topology) * face_normals(surface[0], triangles)[nearest.faces]).sum(1)
     over = int((ahead < -0.5).sum())
-    return f"{over} face(s) turned over" if over > 0.01 * topology.num_faces else ""
+    return f"{over} face(s) turned over" if over > _FOLDED * topology.num_faces else ""
 
 
 def made(surface: Mesh, kind: str, count: int) -> dict[str, Any]:
@@ -127,11 +128,11 @@ def child(name: str, kind: str, count: int | None, answer: Connection) -> None:
     """Sends what came of a mesh."""
     resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
     torch.set_num_threads(1)
-    surface = collection()[name]()
-    corners = surface[1].face_sizes - 2
-    count = count or (700 if int(corners.sum()) >= _MANY else 300)
     begin = time.process_time()
     try:
+        surface = collection()[name]()
+        count = count or (700 if int((surface[1].face_sizes - 2).sum()) >= _MANY else 300)
+        begin = time.process_time()
         row = made(surface, kind, count)
         row["end"] = "broken" if row["fault"] else "meshed"
     except TorchfairError as error:

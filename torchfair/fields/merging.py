@@ -45,7 +45,8 @@ def merge_singularities(
         smoothing: as for the field.
         radius: along edges.
         symmetry: of the field, 2 or 4.
-        stay: (V,) bool: vertices that are not merged with others; none by default.
+        stay: (V,) bool: vertices that keep their index; those that have none take that of a singular vertex within
+            the radius. None by default.
 
     Returns:
         Angles (F,) and matchings (I,); those given, where nothing is to be merged.
@@ -61,6 +62,9 @@ def merge_singularities(
         if not beside.any():
             break
         moved, touched = again, touched | beside
+    if stay is not None:
+        moved, beside = _onto(frames, moved, vertex_charges(frames, angles, moved), stay, radius)
+        touched |= beside
     if not touched.any():
         return angles, matched
     return _refit(frames, angles, moved, directions, smoothing, touched, symmetry), moved
@@ -91,6 +95,29 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
         middle = int(np.argmin(trust[path]))
         steps += [(a, b, int(charges[goal])) for a, b in itertools.pairwise(path[: middle + 1])]
         steps += [(b, a, int(charges[start])) for a, b in itertools.pairwise(path[middle:])]
+        touched[path] = True
+    return _carried(frames, matched, steps), touched
+
+
+def _onto(frames: FaceFrames, matched: Ints, charges: Ints, stay: Bools, radius: float) -> tuple[Ints, Bools]:
+    """Matchings with singular vertices moved onto vertices without an index that stay, the nearest first."""
+    touched = np.zeros(len(frames.points), bool)
+    singular, free = np.flatnonzero((charges != 0) & ~stay), np.flatnonzero((charges == 0) & stay & ~frames.is_boundary)
+    if not (len(singular) and len(free)):
+        return matched, touched
+    distance, before = dijkstra(_inner_edges(frames), indices=singular, limit=radius, return_predecessors=True)
+    near = distance[:, free]
+    steps: list[tuple[int, int, int]] = []
+    taken: set[int] = set()
+    for row, column in np.argwhere(np.isfinite(near))[np.argsort(near[np.isfinite(near)], kind="stable")].tolist():
+        start, goal = int(singular[row]), int(free[column])
+        if not taken.isdisjoint((start, goal)):
+            continue
+        taken |= {start, goal}
+        path = [goal]
+        while path[-1] != start:
+            path.append(int(before[row, path[-1]]))
+        steps += [(a, b, int(charges[start])) for a, b in itertools.pairwise(path[::-1])]
         touched[path] = True
     return _carried(frames, matched, steps), touched
 

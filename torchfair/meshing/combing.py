@@ -38,7 +38,8 @@ def combed(
 
     Crosses are tried for directions, too: the larger and the smaller curvature change places where the surface has an
     umbilic line, crosses go on. They will do if one of their two directions never comes back as the other. Directions
-    that creases at right angles pull both ways, as on a box, run lengthwise where that has fewer singular points.
+    that creases at right angles pull both ways, as on a box, run lengthwise where singular points are fewer and less
+    sharp then.
 
     Args:
         frames: of the triangles.
@@ -54,15 +55,21 @@ def combed(
     tried: tuple[Symmetry, ...] = (4, 2) if symmetry == 2 else (4,)
     for of in tried:
         graphs = []
-        for lengthwise in (False, True) if of == 2 and has_creases else (False,):
-            angles = _field(frames, directions, smoothing, of, creases, angle, lengthwise)
+        for pull in (None, _along_the_longest_axis(frames)) if of == 2 and has_creases else (None,):
+            angles = (
+                _field(frames, directions, smoothing, of, creases, angle)
+                if pull is None
+                else direction_field(frames, directions, smoothing, of, pull)
+            )
             matched = matchings(frames, angles, of)
+            sharpness = int((vertex_charges(frames, angles, matched) ** 2).sum())
             angles, matched = merge_singularities(frames, angles, matched, directions, smoothing, merging, of, stay)
-            graphs.append(cut_open(frames, angles, matched, vertex_charges(frames, angles, matched)))
-        graph = min(graphs, key=lambda graph: int(np.abs(graph.charges).sum()))
+            charges = vertex_charges(frames, angles, matched)
+            graphs.append((sharpness, cut_open(frames, angles, matched, charges)))
+        graph = min(graphs, key=lambda rated: rated[0])[1]
         if symmetry == 4 or not (graph.quarters % 2).any():
             break
-    if symmetry == 4:
+    if symmetry == 4 or of == 2:
         return graph
     along = directions.values * np.exp(-2j * graph.angles)
     across = float(frames.areas @ along.real) < 0
@@ -76,21 +83,20 @@ def _field(
     symmetry: Symmetry,
     creases: Creases | None,
     angle: float,
-    lengthwise: bool,
 ) -> Floats:
-    """The field that follows the creases which it nearly follows by itself, or by the longest axis of the surface."""
+    """The field that follows the creases which it nearly follows by itself."""
     if creases is None or not creases.chains:
         return direction_field(frames, directions, smoothing, symmetry)
     pull, chains = crease_pull(frames, creases)
-    weak = _along_the_longest_axis(frames) if lengthwise else pull
-    field = direction_field(frames, directions, smoothing, symmetry, weak)
-    turns = np.rint((field[pull.faces] - pull.angles) / QUARTER)
-    off = np.abs(field[pull.faces] - pull.angles - turns * QUARTER)
+    field = direction_field(frames, directions, smoothing, symmetry, pull)
+    step = 2 * np.pi / symmetry  # directions follow creases that run along them, crosses those across, too
+    turns = step * np.rint((field[pull.faces] - pull.angles) / step)
+    off = np.abs(field[pull.faces] - pull.angles - turns)
     count = np.bincount(chains)
     follows = np.bincount(chains, off) <= angle * count
     if not follows.any():
         return field
-    firm = Pull(pull.faces, pull.angles + turns * QUARTER, np.where(follows[chains], _FIRM, pull.weights))
+    firm = Pull(pull.faces, pull.angles + turns, np.where(follows[chains], _FIRM, pull.weights))
     return direction_field(frames, directions, smoothing, symmetry, firm)
 
 

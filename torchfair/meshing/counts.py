@@ -69,11 +69,11 @@ def next_spacing(tried: list[tuple[float, int]], count: int) -> float:
     """A spacing that should give the count, from spacings that were tried and their counts.
 
     Between the nearest counts on both sides, where there are some, on a line through the logarithms; else in
-    proportion to the root of the nearest count.
+    proportion to the root of the count, from the spacing that went farthest.
     """
     more, fewer = ([pair for pair in tried if (pair[1] > count) == side] for side in (True, False))
     if not (more and fewer):
-        spacing, found = min(reversed(tried), key=lambda pair: abs(math.log(pair[1] / count)))  # of equals the last
+        spacing, found = min(more or fewer, key=lambda pair: pair[0] if fewer else -pair[0])
         return spacing * math.sqrt(found / count)
     finer, many = min(more, key=lambda pair: (pair[1], -pair[0]))
     coarser, few = max(fewer, key=lambda pair: (pair[1], -pair[0]))
