@@ -227,3 +227,16 @@ def test_opposite_singular_vertices_cancel() -> None:
     assert sorted(charges[charges != 0].tolist()) == [-1, 1]
     angles, matched = merge_singularities(frames, angles, matched, directions, 0.05, 0.2)
     assert not vertex_charges(frames, angles, matched).any()
+
+
+def test_singular_vertices_move_onto_corners_nearby_that_have_no_index() -> None:
+    frames, directions, angles, matched = field(*ellipsoid(3))
+    charges = vertex_charges(frames, angles, matched)
+    singular = np.flatnonzero(charges)
+    beside = [int(frames.edges[(frames.edges == vertex).any(1)].sum(1)[0] - vertex) for vertex in singular[:2]]
+    stay = np.zeros(len(charges), bool)
+    stay[[*beside, singular[2]]] = True  # the last has an index already
+    angles, matched = merge_singularities(frames, angles, matched, directions, 0.05, 0.2, 4, stay)
+    after = vertex_charges(frames, angles, matched)
+    assert np.flatnonzero(after).tolist() == sorted([*beside, *singular[2:].tolist()])
+    assert (after[beside] == charges[singular[:2]]).all()

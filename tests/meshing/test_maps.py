@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from torchfair.meshing.off_lines import off_the_lines
 from torchfair.meshing.seamless_map import SeamlessMap
 from torchfair.meshing.seams import ROTATIONS, find_seams
 from torchfair.meshing.tracing import Cells, trace_cells
-from torchfair.meshing.untangling import untangled
+from torchfair.meshing.untangling import is_hopeless, untangled
 from torchfair.shapes import Cylinder, PrincipalParaboloid, Torus, icosphere
 
 SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
@@ -210,3 +211,12 @@ def test_branches_are_vertices_covered_twice() -> None:
     middle = int(np.argmin(np.abs(found.values)))
     assert len(doubled.branches) >= 1
     assert np.abs(found.values[found.seams.vertex == doubled.branches[0]]).min() < 4 * np.abs(found.values[middle]) + 1
+
+
+def test_maps_with_much_turned_over_are_hopeless() -> None:
+    found = problem_of(*cut(*irregular(SADDLE, 700)), 0.2)[0].candidates()[0]
+    assert not is_hopeless(found)
+    for count, hopeless in ((40, False), (41, True)):
+        areas = found.areas.copy()
+        areas[:count] = -1
+        assert is_hopeless(replace(found, areas=areas)) is hopeless

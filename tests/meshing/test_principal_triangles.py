@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from creased_shapes import box
 from meshing_tools import MonkeySaddle, ellipsoid, irregular, side_by_side
 
 from torchfair.formfinding import principal_symmetric
@@ -119,3 +120,17 @@ def test_clipped_cells_are_cut_without_turning_triangles_over() -> None:
     areas = [np.cross(bent[b] - bent[a], bent[c] - bent[a])[2] / 2 for a, b, c in triangles]
     assert min(areas) > 0
     assert sum(areas) == pytest.approx(2.2)
+
+
+@pytest.mark.parametrize("lines", [2, 13])
+def test_boxes_have_rows_lengthwise_and_keep_their_edges(lines: int) -> None:
+    """Directions have four half turns on a box, but creases at right angles pull them both ways in every side."""
+    vertices, topology = box(lines)
+    found = principal_triangles(vertices, topology, count=700 if lines > 2 else 300)
+    assert found.report["singular"] == {"0.5": 4}
+    assert shape_of(found.topology) == shape_of(topology)
+    assert found.report["crease_edges"] >= 36
+    assert found.report["variation_over_curvature"] == pytest.approx(1, abs=1e-6)
+    corners = vertices[(vertices * (1 - vertices) == 0).all(1)]
+    assert (corners[:, None] == found.vertices).all(-1).any(1).all()
+    assert not any("creases" in note for note in found.notes)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import pytest
 from meshing_tools import Flat, cut, ellipsoid, irregular, problem_of
 
 from torchfair.fields import FaceFrames, matchings
 from torchfair.fields.frames import Floats
-from torchfair.meshing import MeshingSettings
+from torchfair.meshing import MeshingSettings, ladder
+from torchfair.meshing.attempt import FailedAttemptError, Plan
 from torchfair.meshing.components import read_surface
 from torchfair.meshing.cut_graph import CutGraph, cut_open
-from torchfair.meshing.ladder import mesh_component
+from torchfair.meshing.ladder import NoMeshError, mesh_component
 from torchfair.meshing.lattice import SQUARES
 from torchfair.meshing.relaxation import loosened, stretched
 from torchfair.meshing.separation import gaps, separate_vectors
-from torchfair.shapes import Torus
+from torchfair.shapes import PrincipalParaboloid, Torus
 
 
 def off_the_field(jacobians: Floats) -> float:
@@ -68,6 +71,18 @@ def test_gaps_are_whole_whatever_cuts_lie_between() -> None:
     assert gaps(frames, graph, problem.seams, 0.3).shape[0] < len(between)
 
 
+def test_nodes_are_kept_apart_whether_they_are_singular_or_not() -> None:
+    frames, graph = cut(*ellipsoid(3))
+    singular = np.flatnonzero(graph.charges)
+    near = np.linalg.norm(frames.points - frames.points[singular[0]], axis=1)
+    graph.nodes[np.argsort(near)[3]] = True  # such as the end of a crease
+    problem = problem_of(frames, graph, 0.3)[0]
+    between = gaps(frames, graph, problem.seams, 10.0)
+    assert between.shape[0] == 9 * 8 / 2
+    for found in problem.candidates():
+        assert (np.abs(between @ found.values) > 0.5).all()
+
+
 def test_vectors_that_let_singular_points_coincide_are_avoided() -> None:
     metric, target = np.diag([1.0, 0.9, 0.8]), np.array([0.3, -0.1, 2.1])
     rows = np.array([[1.0, 0, 0], [0, 1, 0]])
@@ -85,6 +100,27 @@ def test_a_search_can_begin_with_a_later_plan() -> None:
     assert (words, plan) == ("", 0)
     _, words, plan = mesh_component(*given, first=1)
     assert (words, plan) == ("boundary not aligned", 1)
+
+
+def test_with_another_spacing_only_plans_of_the_same_size_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[Plan] = []
+
+    def fails(*given: Any) -> None:
+        tried.append(given[4])
+        raise FailedAttemptError("no", hopeless=len(tried) == 1)
+
+    monkeypatch.setattr(ladder, "attempt", fails)
+    surface = read_surface(*irregular(PrincipalParaboloid(), 600), MeshingSettings())
+    given = surface.parts[0], surface.fields[0], SQUARES, 0.5, 0.25, MeshingSettings()
+    with pytest.raises(NoMeshError, match="5 setting"):
+        mesh_component(*given, first=3)
+    assert {plan.spacing for plan in tried} == {0.5}
+    tried.clear()
+    with pytest.raises(NoMeshError):
+        mesh_component(*given)
+    kinds = [(plan.smoothing, plan.align) for plan in tried]
+    assert kinds.count(kinds[0]) == 1  # hopeless: not tried with other spacings
+    assert kinds.count(kinds[1]) == 5
 
 
 def test_steps_go_the_way_in_which_they_are_apart() -> None:

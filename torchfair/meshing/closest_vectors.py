@@ -22,7 +22,7 @@ class WholeVectors(NamedTuple):
     costs: Floats
 
 
-def closest_vectors(metric: Floats, target: Floats, beam: int = 64) -> WholeVectors:
+def closest_vectors(metric: Floats, target: Floats, beam: int = 256) -> WholeVectors:
     """Whole vectors ``y`` with small ``(y - target)^T metric (y - target)``.
 
     In a reduced basis unknowns are rounded one after the other, the most certain first, each followed by the best
