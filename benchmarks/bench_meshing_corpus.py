@@ -119,7 +119,11 @@ def made(surface: Mesh, kind: str, count: int) -> dict[str, Any]:
         mesh, job = planar_quads(mesh, surface)
         row = {"planarity": mesh.report["planarity_max"], "missed": [str(of) for of in job.promises if not of.holds]}
     report = mesh.report
-    row |= {"faces": report["faces"], "angle": report["angle_mean_degrees"], "ratio": report["variation_over_curvature"]}
+    row |= {
+        "faces": report["faces"],
+        "angle": report["angle_mean_degrees"],
+        "ratio": report["variation_over_curvature"],
+    }
     row |= {"distance": report["distance_max"], "singular": report["singular"], "notes": mesh.notes}
     return row | {"fault": fault(mesh.vertices, mesh.topology, surface)}
 

@@ -63,9 +63,7 @@ class FailedAttemptError(MeshError):
         hopeless: whether so much was wrong that a spacing a little different will not do, nor one crease less.
     """
 
-    def __init__(
-        self, message: str, vertex: int = -1, place: Floats | None = None, *, hopeless: bool = False
-    ) -> None:
+    def __init__(self, message: str, vertex: int = -1, place: Floats | None = None, *, hopeless: bool = False) -> None:
         super().__init__(message)
         self.vertex, self.place, self.hopeless = vertex, place, hopeless
 

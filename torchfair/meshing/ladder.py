@@ -140,9 +140,7 @@ def _in_words(plan: Plan, words: str) -> str:
     return ", ".join(filter(None, [words, f"creases not aligned near {places}" if places else ""]))
 
 
-def plans(
-    spacing: float, smoothing: float, settings: MeshingSettings, creased: bool = False
-) -> Iterator[Rung]:
+def plans(spacing: float, smoothing: float, settings: MeshingSettings, creased: bool = False) -> Iterator[Rung]:
     """What is tried, one after the other; without the creases at last, where there are any."""
     for kept in (True, False) if creased else (False,):
         can_align = settings.align_boundary or kept
