@@ -236,7 +236,7 @@ def test_singular_vertices_move_onto_corners_nearby_that_have_no_index() -> None
     beside = [int(frames.edges[(frames.edges == vertex).any(1)].sum(1)[0] - vertex) for vertex in singular[:2]]
     stay = np.zeros(len(charges), bool)
     stay[[*beside, singular[2]]] = True  # the last has an index already
-    angles, matched = merge_singularities(frames, angles, matched, directions, 0.05, 0.2, 4, stay)
+    angles, matched = merge_singularities(frames, angles, matched, directions, 0.05, 5.0, 4, stay)
     after = vertex_charges(frames, angles, matched)
     assert np.flatnonzero(after).tolist() == sorted([*beside, *singular[2:].tolist()])
     assert (after[beside] == charges[singular[:2]]).all()
