@@ -15,7 +15,10 @@ from docutils import nodes
 from sphinx.util import logging
 
 import torchfair
-from torchfair import __version__
+from torchfair import __version__, meshing
+from torchfair.formfinding.fair import planar_quads
+
+planar_quads.QuadMesh = meshing.QuadMesh  # imported there for types only, and without it no type is a link
 
 project = "torchfair"
 author = "The torchfair developers"
