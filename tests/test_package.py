@@ -106,7 +106,8 @@ def test_version_and_date_are_the_same_everywhere() -> None:
     assert released[0][0] == torchfair.__version__
     assert re.findall(r"^version: (.*)\ndate-released: (.*)$", citation, re.M) == released[:1]
     newest = changes.split("\n## ")[2 if "## Unreleased" in changes else 1]
-    assert re.findall(r"^### (.*)$", newest, re.M) == ["Added", "Changed", "Fixed"]
+    assert re.findall(r"^### (.*)$", newest, re.M) == ["Changed behaviour", "Added", "Faster", "Fixed"]
+    assert "**Changed behaviour" not in changes  # it has a section, which those look for who update
 
 
 def test_errors() -> None:
