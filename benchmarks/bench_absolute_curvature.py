@@ -38,6 +38,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 from barrel_problem import barrel
@@ -97,7 +98,7 @@ class Run:
         """Final C."""
         return self.result.after["total_absolute_curvature"]
 
-    def row(self) -> dict[str, object]:
+    def row(self) -> dict[str, Any]:
         """For JSON."""
         stages = self.result.runs
         split = {part: sum(stage.timings[part] for stage in stages) for part in PARTS}
@@ -139,7 +140,7 @@ def warm_up() -> None:
     run(barrel(100))
 
 
-def measure(size: int, repeats: int) -> tuple[Run, dict[str, object]]:
+def measure(size: int, repeats: int) -> tuple[Run, dict[str, Any]]:
     """Ours at one size: least time of the repetitions."""
     mesh = barrel(size)
     runs = [run(mesh) for _ in range(repeats)]
@@ -150,7 +151,7 @@ def measure(size: int, repeats: int) -> tuple[Run, dict[str, object]]:
     return best, {**row, "within_s": wall, "within_processor_s": processor}
 
 
-def measure_lifted(size: int, ours: Run, limit: float) -> dict[str, object]:
+def measure_lifted(size: int, ours: Run, limit: float) -> dict[str, Any]:
     """The paper's variables at one size."""
     lifted = run(barrel(size), FormSettings(formulation="lifted"), limit)
     to_ours = lifted.within(ours.curvature)
@@ -168,7 +169,7 @@ def measure_lifted(size: int, ours: Run, limit: float) -> dict[str, object]:
     }
 
 
-def report(row: dict[str, object], lifted: dict[str, object] | None, printed: Printed | None) -> None:
+def report(row: dict[str, Any], lifted: dict[str, Any] | None, printed: Printed | None) -> None:
     """One line of the table."""
     print(f"{row['vertices']:>6}{row['unknowns']:>8}{row['steps']:>4}{row['curvature']:8.3f}", end="")
     print(f"{row['total_s']:8.2f}{row['within_s']:7.2f}{row['within_processor_s']:7.2f} |", end="")
@@ -197,7 +198,7 @@ HEADER = f"""{"ours":>47} |{"lifted, the paper's variables":>41} |{"paper":>17} 
  lin. sol. mer. oth. out."""
 
 
-def in_its_own_process(size: int, repeats: int, threads: int) -> dict[str, object]:
+def in_its_own_process(size: int, repeats: int, threads: int) -> dict[str, Any]:
     """Ours at one size, with the largest memory of the process."""
     options = {"--child": size, "--repeats": repeats, "--threads": threads}
     command = [sys.executable, __file__, *(str(word) for pair in options.items() for word in pair)]
@@ -212,7 +213,7 @@ def child(size: int, repeats: int) -> None:
     print(json.dumps({**row, "peak_memory_gib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit}))
 
 
-def growth(sizes: list[int], repeats: int, threads: int) -> dict[str, object]:
+def growth(sizes: list[int], repeats: int, threads: int) -> dict[str, Any]:
     """Exponent of the time to 1 % and memory."""
     print(f"\n{'V':>7}{'steps':>7}{'C':>9}{'total':>9}{'1 %':>9}{'proc.':>9}{'memory':>10}")
     rows = []
@@ -222,7 +223,7 @@ def growth(sizes: list[int], repeats: int, threads: int) -> dict[str, object]:
         print(f"{last['vertices']:>7}{last['steps']:>7}{last['curvature']:9.3f}", end="")
         print(*(f"{last[time]:8.2f}" for time in ("total_s", "within_s", "within_processor_s")), end="")
         print(f"{last['peak_memory_gib']:6.2f} GiB", flush=True)
-    summary: dict[str, object] = {"rows": rows}
+    summary: dict[str, Any] = {"rows": rows}
     if len(rows) > 1:
         wall, processor = (_exponent(rows, time) for time in ("within_s", "within_processor_s"))
         summary |= {"exponent": wall, "exponent_processor": processor}
@@ -235,7 +236,7 @@ def growth(sizes: list[int], repeats: int, threads: int) -> dict[str, object]:
     return summary
 
 
-def _exponent(rows: list[dict[str, object]], kind: str) -> float:
+def _exponent(rows: list[dict[str, Any]], kind: str) -> float:
     logs = torch.tensor([[math.log(row[key]) for row in rows] for key in ("vertices", kind)])
     across, up = logs - logs.mean(1, keepdim=True)
     return float((across * up).sum() / (across * across).sum())
@@ -245,7 +246,7 @@ def verdict(met: bool) -> str:
     return "met" if met else "MISSED"
 
 
-def summarise(rows: list[dict[str, object]]) -> None:
+def summarise(rows: list[dict[str, Any]]) -> None:
     """Smallest ratios against the targets."""
     for over, kind in (("within_s", "wall time"), ("within_processor_s", "processor time")):
         paper = [TABLE[row["size"]].seconds / row[over] for row in rows if row["size"] in TABLE]
@@ -281,7 +282,7 @@ def main() -> None:
     )
     print(f"load {start_load[0]:.1f}; seconds; * stopped by the limit\n{HEADER}")
     warm_up()
-    rows: list[dict[str, object]] = []
+    rows: list[dict[str, Any]] = []
     for size in arguments.sizes:
         ours, row = measure(size, arguments.repeats)
         row["lifted"] = None if arguments.skip_lifted else measure_lifted(size, ours, arguments.lifted_limit)

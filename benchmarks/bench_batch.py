@@ -14,6 +14,7 @@ import argparse
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 import torch
 from torus_problem import torus_problem
@@ -33,7 +34,7 @@ def settings(steps: int) -> ProjectionSettings:
     )
 
 
-def run(members: int, size: int, steps: int, repeats: int) -> dict[str, object]:
+def run(members: int, size: int, steps: int, repeats: int) -> dict[str, Any]:
     start, terms = torus_problem(size)
     generator = torch.Generator().manual_seed(0)
     vertices = start["vertices"]
@@ -71,7 +72,8 @@ def main() -> None:
     print(f"{'case':>10} {'loop s':>9} {'fresh s':>9} {'again s':>9} {'ratios':>14} {'target':>7} {'difference':>11}")
     rows = []
     for case in options.cases:
-        row = run(*map(int, case.split("x")), options.steps, options.repeats)
+        members, size = map(int, case.split("x"))
+        row = run(members, size, options.steps, options.repeats)
         rows.append(row)
         ratios = [row["loop"] / row[name] for name in ("fresh", "again")]
         numbers = " ".join(f"{row[name]:9.2f}" for name in ("loop", "fresh", "again"))

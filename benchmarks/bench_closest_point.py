@@ -11,6 +11,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +67,7 @@ def measure(vertices: Tensor, topology: Topology, count: int, repeats: int) -> d
         tracker = surface.tracker()
         tracker.closest(points)
         tracker.closest(points)  # at rest: candidates are gathered
-        result[f"moved {share:g} edges"] = best(lambda t=tracker, p=moved: t.closest(p), repeats)
+        result[f"moved {share:g} edges"] = best(partial(tracker.closest, moved), repeats)
     tree = cKDTree(vertices.numpy())
     result["nearest vertex"] = best(lambda: tree.query(points.numpy()), repeats)
     return result

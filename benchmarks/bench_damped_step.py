@@ -30,10 +30,11 @@ import resource
 import statistics
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy
@@ -42,11 +43,20 @@ from torch import Tensor
 from torus_problem import torus_problem
 
 import torchfair
-from torchfair.linear import ConjugateGradients, Factor, LinearSolver, PardisoDirect, RslabDirect, ScipyDirect, Solution
+from torchfair.linear import (
+    ConjugateGradients,
+    Factor,
+    LinearSolver,
+    PardisoDirect,
+    RslabDirect,
+    ScipyDirect,
+    Solution,
+    System,
+)
 from torchfair.projection import GuidedProjection, IterationRecord, ProjectionSettings
 from torchfair.projection.linear_system import LinearSystem
 from torchfair.projection.proposal import descend
-from torchfair.projection.system import Structure
+from torchfair.projection.system import Evaluation, Structure
 
 PARTS = ("jacobian", "assembly", "factor", "solve", "merit", "other", "whole")
 COLUMNS = (*PARTS, "corrected")
@@ -55,6 +65,7 @@ TARGETS |= {("cg", 2784): 20.0, ("cg", 10000): 120.0, ("cg", 50000): 300.0, ("cg
 SOLVERS = {"rslab": RslabDirect, "pardiso": PardisoDirect, "scipy": ScipyDirect, "cg": ConjugateGradients}
 LARGEST = {"rslab": 60_000, "pardiso": 60_000, "scipy": 12_000, "cg": 10**9}  # sizes at which each solver is tried
 
+T = TypeVar("T")
 Seconds = tuple[float, float]  # wall, processor
 
 
@@ -82,10 +93,10 @@ class Clock:
         end, sum_ = now(), self._parts[name]
         self._parts[name] = (sum_[0] + end[0] - start[0], sum_[1] + end[1] - start[1])
 
-    def timed(self, name: str, function: Callable[..., object]) -> Callable[..., object]:
+    def timed(self, name: str, function: Callable[..., T]) -> Callable[..., T]:
         """The function, with its time counted."""
 
-        def call(*arguments: object) -> object:
+        def call(*arguments: object) -> T:
             with self.part(name):
                 return function(*arguments)
 
@@ -109,8 +120,9 @@ class Timed:
         self.name, self.inexact, self.prepare = solver.name, solver.inexact, solver.prepare
         self._solver, self._clock = solver, clock
 
-    def factorise(self, system: LinearSystem, damping: Tensor) -> TimedFactor:
+    def factorise(self, system: System, damping: Tensor) -> TimedFactor:
         """The factor, with what it is made of computed before."""
+        assert isinstance(system, LinearSystem)
         with self._clock.part("assembly"):
             if self.inexact:
                 system.jacobian, system.diagonal_blocks  # noqa: B018  (stored now, used by the solver)
@@ -126,7 +138,7 @@ class TimedFactor:
     def __init__(self, factor: Factor, clock: Clock) -> None:
         self._factor, self._clock = factor, clock
 
-    def solve(self, right: Tensor, accuracy: float) -> Solution:
+    def solve(self, right: Tensor, accuracy: float = 0.0) -> Solution:
         """The solution, as good as a step needs it."""
         with self._clock.part("solve"):
             return descend(self._factor, right, accuracy)
@@ -173,13 +185,13 @@ class Case:
     def _time(self, structure: Structure) -> None:
         linearise = structure.linearise
 
-        def all_of_it(*arguments: object) -> LinearSystem:
-            system = linearise(*arguments)
+        def all_of_it(state: Mapping[str, Tensor] | Evaluation) -> LinearSystem:
+            system = linearise(state)
             system.gradient  # noqa: B018
             return system
 
-        structure.linearise = self.clock.timed("jacobian", all_of_it)
-        structure.evaluate = self.clock.timed("merit", structure.evaluate)
+        structure.linearise = self.clock.timed("jacobian", all_of_it)  # type: ignore[method-assign]
+        structure.evaluate = self.clock.timed("merit", structure.evaluate)  # type: ignore[method-assign]
 
     def run(self) -> None:
         """A few damped steps from the start."""
@@ -193,9 +205,9 @@ class Case:
         self.inner = [record.inner_iterations for record in result.history[1:]]
         self.merit = result.merit
 
-    def result(self) -> dict[str, object]:
+    def result(self) -> dict[str, Any]:
         """Least of the runs for each step, then the median of the steps; milliseconds."""
-        row: dict[str, object] = {"vertices": self.start["vertices"].shape[0], "solver": self.name}
+        row: dict[str, Any] = {"vertices": self.start["vertices"].shape[0], "solver": self.name}
         for index, kind in enumerate(("wall_ms", "processor_ms")):
             row[kind] = {part: 1e3 * _median(self.runs, part, index) for part in PARTS}
             row[kind]["corrected"] = 1e3 * _median(self.corrected, "whole", index)
@@ -211,7 +223,7 @@ def _median(runs: list[list[dict[str, Seconds]]], part: str, index: int) -> floa
     return statistics.median(min(step.get(part, (0.0, 0.0))[index] for step in same) for same in steps)
 
 
-def report(row: dict[str, object]) -> None:
+def report(row: dict[str, Any]) -> None:
     wall, processor = row["wall_ms"], row["processor_ms"]
     print(f"{row['vertices']:>7} {row['solver']:9}", *(f"{wall[part]:9.2f}" for part in COLUMNS), end="")
     outside = 1.0 - (processor["factor"] + processor["solve"]) / processor["whole"]

@@ -25,10 +25,11 @@ from torchfair import constraints as c
 from torchfair.geometry import ReferenceSurface, corner_angles, face_areas
 from torchfair.principal import principal_edges_of_lattice
 from torchfair.projection import ElementTerm
+from torchfair.projection.differentiation import Way
 from torchfair.projection.layout import State
 from torchfair.shapes import Torus, principal_quads, principal_triangles
 
-WAYS = ("closed form", "sums", "jacrev", "jacfwd")
+WAYS: tuple[Way, ...] = ("closed form", "sums", "jacrev", "jacfwd")
 
 
 def products(x: torch.Tensor) -> torch.Tensor:

@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -104,7 +105,7 @@ def main() -> None:
         start = tracks["plain"].energies[0]
         near = best + 0.01 * (start - best)
         print(f"{name:22}{start:9.3f}{best:9.3f}", end="")
-        row: dict[str, object] = {"mesh": name, "start": start, "best": best}
+        row: dict[str, Any] = {"mesh": name, "start": start, "best": best}
         for side, track in tracks.items():
             row[side] = {
                 "energy": track.energies[-1],

@@ -21,7 +21,9 @@ import os
 import platform
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # SciPy's vectors are short: on a busy machine threads harm it
 
@@ -61,10 +63,11 @@ class Problem:
     def residual(self, x: np.ndarray) -> np.ndarray:
         """Residuals whose half sum of squares is the merit."""
         evaluation, bend, smooth = self._evaluate(x)
+        assert evaluation.affine is not None
         result = torch.cat([bend * torch.sqrt(2.0 / (smooth + SMOOTHING)), evaluation.affine])
-        merit = 0.5 * float(result @ result)
-        if abs(merit - evaluation.merit) > 1e-12 * merit:
-            raise AssertionError(f"the merits differ: {merit} and {evaluation.merit}")
+        merit, engines = 0.5 * float(result @ result), float(evaluation.merits)
+        if abs(merit - engines) > 1e-12 * merit:
+            raise AssertionError(f"the merits differ: {merit} and {engines}")
         self.path.append((time.perf_counter() - self.begin[0], time.process_time() - self.begin[1], merit))
         return result.numpy()
 
@@ -75,7 +78,7 @@ class Problem:
         system.jacobians[0] *= torch.sqrt((smooth + SMOOTHING) / (2.0 * smooth))
         matrix = system.jacobian
         parts = (matrix.values().numpy(), matrix.col_indices().numpy(), matrix.crow_indices().numpy())
-        return sp.csr_matrix(parts, matrix.shape)
+        return sp.csr_matrix(parts, (matrix.shape[0], matrix.shape[1]))
 
 
 def run_scipy(size: int, evaluations: int, options: dict[str, int]) -> Path_:
@@ -125,11 +128,11 @@ def time_to(path: Path_, merit: float) -> tuple[float, float]:
     return next(((wall, processor) for wall, processor, m in path if m <= merit), (float("inf"), float("inf")))
 
 
-def compare(size: int, evaluations: int, steps: int, repeats: int) -> dict[str, object]:
+def compare(size: int, evaluations: int, steps: int, repeats: int) -> dict[str, Any]:
     solvers = ["cg", "rslab" if RslabDirect.available() else "scipy"]
     jobs: dict[str, Callable[[], Path_]] = {
-        **{name: lambda o=options: run_scipy(size, evaluations, o) for name, options in LSMR.items()},
-        **{f"torchfair, {solver}": lambda s=solver: run_ours(size, s, steps) for solver in solvers},
+        **{name: partial(run_scipy, size, evaluations, options) for name, options in LSMR.items()},
+        **{f"torchfair, {solver}": partial(run_ours, size, solver, steps) for solver in solvers},
     }
     runs: dict[str, list[Path_]] = {name: [] for name in jobs}
     for _ in range(repeats):
@@ -147,7 +150,7 @@ def compare(size: int, evaluations: int, steps: int, repeats: int) -> dict[str, 
     return {"vertices": torus_problem(size)[0]["vertices"].shape[0], "paths": paths, "ratios": ratios}
 
 
-def report(result: dict[str, object]) -> None:
+def report(result: dict[str, Any]) -> None:
     paths, ratios = result["paths"], result["ratios"]
     print(f"\nV = {result['vertices']}: merit over time")
     print(f"{'processor s':>12}", *(f"{name:>22}" for name in paths))

@@ -28,6 +28,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import torch
 from meshing_peers import PEERS, PeerMesh, installed, run_peer
@@ -108,7 +109,7 @@ def child(quads: int, triangles: int) -> None:
     print(json.dumps({**row, "memory": gigabytes, "angle": made.report["angle_mean_degrees"], "notes": made.notes}))
 
 
-def growth(sizes: list[tuple[int, int]]) -> list[dict[str, object]]:
+def growth(sizes: list[tuple[int, int]]) -> list[dict[str, Any]]:
     """One line for every size, and the exponent."""
     print(f"{'asked for':>10}{'faces':>9}{'triangles':>11}{'seconds':>9}{'memory':>9}{'angle':>7}  target")
     rows = []
@@ -150,14 +151,14 @@ def ours(surface: Mesh, count: int) -> PeerMesh | str:
     return PeerMesh(made.vertices.numpy(), made.topology, min(times))
 
 
-def judged(mesh: PeerMesh | str, surface: Mesh, read: ReadSurface) -> dict[str, object]:
+def judged(mesh: PeerMesh | str, surface: Mesh, read: ReadSurface) -> dict[str, Any]:
     """What a mesh is like on the surface, which has been read, by one measure for all."""
     if isinstance(mesh, str):
         return {"failure": mesh}
     vertices = torch.as_tensor(mesh.vertices, dtype=torch.float64)
     try:
-        own = isinstance(mesh.quads, Topology)
-        topology = mesh.quads if own else Topology.from_faces(torch.as_tensor(mesh.quads), len(vertices))
+        quads = mesh.quads
+        topology = quads if isinstance(quads, Topology) else Topology.from_faces(torch.from_numpy(quads), len(vertices))
     except TorchfairError as error:
         return {"failure": f"no manifold ({error})", "seconds": mesh.seconds}
     spacing = float(edge_lengths(vertices, topology).mean())
@@ -175,7 +176,7 @@ def judged(mesh: PeerMesh | str, surface: Mesh, read: ReadSurface) -> dict[str, 
     }
 
 
-def compare(names: list[str], count: int) -> dict[str, dict[str, dict[str, object]]]:
+def compare(names: list[str], count: int) -> dict[str, dict[str, dict[str, Any]]]:
     """All sides on every surface, and whether ours is better."""
     peers = installed()
     for name in PEERS.keys() - set(peers):
@@ -184,7 +185,7 @@ def compare(names: list[str], count: int) -> dict[str, dict[str, dict[str, objec
         f"\n{'surface':<18}{'':<16}{'faces':>6}{'angle':>8}{'95 %':>7}{'E/C':>7}{'distance':>10}{'seconds':>9}", end=""
     )
     print("  topology")
-    table: dict[str, dict[str, dict[str, object]]] = {}
+    table: dict[str, dict[str, dict[str, Any]]] = {}
     for name in names:
         surface = surface_of(name)
         arrays = surface[0].numpy(), surface[1].triangles.numpy()
@@ -199,14 +200,14 @@ def compare(names: list[str], count: int) -> dict[str, dict[str, dict[str, objec
     return table
 
 
-def line(row: dict[str, object]) -> str:
+def line(row: dict[str, Any]) -> str:
     if "failure" in row:
         return f"  {row['failure']}"
     words = f"{row['faces']:>6}{row['angle']:8.2f}{row['angle_95']:7.2f}{row['ratio']:7.3f}{row['distance']:10.3f}"
     return words + f"{row['seconds']:9.2f}  {'same' if row['topology'] else 'OTHER'}"
 
 
-def summarise(peer: str, table: dict[str, dict[str, dict[str, object]]]) -> None:
+def summarise(peer: str, table: dict[str, dict[str, dict[str, Any]]]) -> None:
     """On how many surfaces ours is better than a peer."""
     both = [(rows[OURS], rows[peer]) for rows in table.values() if "failure" not in {*rows[OURS], *rows[peer]}]
     if not both:

@@ -29,6 +29,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -105,13 +106,13 @@ def run(energy: Energy, vertices: Tensor, clock: Clock = time.perf_counter) -> t
     variable = vertices.clone().requires_grad_()
     start = clock()
     value = energy(variable)
-    value.backward()  # type: ignore[no-untyped-call]
+    value.backward()
     seconds = clock() - start
     assert variable.grad is not None
     return seconds, value.item(), variable.grad
 
 
-def measure(vertex_count: int, dtype: torch.dtype, repeats: int, clock: Clock) -> dict[str, object]:
+def measure(vertex_count: int, dtype: torch.dtype, repeats: int, clock: Clock) -> dict[str, Any]:
     vertices, topology = shaken_torus(vertex_count)
     vertices = vertices.to(dtype)
     energies: dict[str, Energy] = {
@@ -151,7 +152,7 @@ def measure(vertex_count: int, dtype: torch.dtype, repeats: int, clock: Clock) -
     }
 
 
-def report(result: dict[str, object], threads: int) -> str:
+def report(result: dict[str, Any], threads: int) -> str:
     lines = [
         f"{result['vertices']} vertices, {result['dtype']}, {threads} thread(s), {result['repeats']} repeats",
         f"  relative difference from plain: {result['relative_difference_of_values']:.0e} in value,"

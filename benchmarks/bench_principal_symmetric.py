@@ -36,6 +36,7 @@ import statistics
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 from symmetric_problems import CASES, SHAPES, Handles, prepared, variables_as_printed
@@ -46,6 +47,7 @@ from torchfair.formfinding import SymmetricDesign
 from torchfair.formfinding.symmetric.measures import condition_residuals
 from torchfair.geometry import edge_lengths
 from torchfair.projection.layout import State
+from torchfair.settings.symmetric_settings import Formulation
 
 FORMULATIONS = ("spheres", "eliminated", "lifted")
 WANTED = 1e-6
@@ -113,7 +115,7 @@ def steps_to_residual(design: SymmetricDesign, places: Handles) -> int | None:
 class Edits:
     """One case in one formulation, designed and ready to be edited again and again."""
 
-    def __init__(self, size: int, formulation: str, move: float) -> None:
+    def __init__(self, size: int, formulation: Formulation, move: float) -> None:
         self.size, self.formulation = size, formulation
         self.design, handles = prepared(SHAPES[size], formulation)
         self.design.move(handles)
@@ -131,7 +133,7 @@ class Edits:
         self.answers = [edited(self.design, places) for places in self.places]
         self.times.append([answer.seconds for answer in self.answers])
 
-    def row(self) -> dict[str, object]:
+    def row(self) -> dict[str, Any]:
         """Figures; times are the least of the repetitions of an edit."""
         steps = [sum(run.iterations for run in answer.runs) for answer in self.answers]
         seconds = [[min(times) for times in zip(*edit, strict=True)] for edit in zip(*self.times, strict=True)]
@@ -161,7 +163,7 @@ HEADER = f"{'V':>5} {'formulation':12}{'unkn.':>7}{'to 1e-6':>8}{'steps':>9}{'an
 {'steps/s':>8}{'proc.':>6}{'spheres over':>13}{'paper over':>11}{'residual':>10}{'sides':>7}{'handles':>9}"
 
 
-def report(row: dict[str, object], spheres: dict[str, object] | None) -> None:
+def report(row: dict[str, Any], spheres: dict[str, Any] | None) -> None:
     """One line of the table."""
     total = sum(row["steps"])
     wall, processor = (total / sum(row[kind]) for kind in ("answer_s", "answer_processor_s"))
@@ -188,10 +190,10 @@ def verdict(met: bool) -> str:
 
 
 def edits(
-    sizes: list[int], formulations: list[str], repeats: int, move: float, lifted_most: int
-) -> list[dict[str, object]]:
+    sizes: list[int], formulations: list[Formulation], repeats: int, move: float, lifted_most: int
+) -> list[dict[str, Any]]:
     """All edits of all cases, formulations in turn."""
-    rows = []
+    rows: list[dict[str, Any]] = []
     for size in sizes:
         cases = [Edits(size, name, move) for name in formulations if name != "lifted" or size <= lifted_most]
         for _ in range(repeats):
@@ -204,7 +206,7 @@ def edits(
     return rows
 
 
-def table_20(figures: list[str], formulations: list[str], steps: int) -> list[dict[str, object]]:
+def table_20(figures: list[str], formulations: list[Formulation], steps: int) -> list[dict[str, Any]]:
     """Variables and seconds of a damped step from the first pull of the handles, beside the paper's."""
     print(f"\n{'ours':>44}{'paper':>41}\n{'fig.':>5}{'V':>6}{'E':>7}{'F':>7}{'stars':>7}  {'formulation':12}", end="")
     print(f"{'variables':>10}{'as printed':>11}{'s/step':>8}{'variables':>11}{'s/step':>8}{'over ours':>11}")
@@ -255,7 +257,7 @@ def main() -> None:
     options = parser.parse_args()
     machine = platform.processor() or platform.machine()
     print(f"{machine}, torch {torch.__version__}, load {os.getloadavg()[0]:.1f}; seconds")
-    document: dict[str, object] = {"torchfair": torchfair.__version__, "torch": torch.__version__}
+    document: dict[str, Any] = {"torchfair": torchfair.__version__, "torch": torch.__version__}
     document["load"] = os.getloadavg()
     for threads in options.threads:
         torch.set_num_threads(threads)

@@ -181,7 +181,7 @@ JOBS: dict[str, tuple[Callable[[], Iterator[tuple[str, Any]]], dict[str, Callabl
 
 def measured(result: JobResult[Any], job: str) -> dict[str, float]:
     """What a row shows, of the start and of the result."""
-    rows = {}
+    rows: dict[str, float] = {}
     for when, values in (("before", result.before), ("after", result.after)):
         if job == "symmetric":
             values = {**values, "largest_residual": max(values["largest_cospherical"], values["largest_coplanar"])}

@@ -31,6 +31,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).resolve().parent
 COMMANDS = {
@@ -170,7 +171,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
     trees = {"this": HERE.parent} | ({"other": options.against.resolve()} if options.against else {})
-    rows: list[dict[str, object]] = []
+    rows: list[dict[str, Any]] = []
     print(f"{'task':9}{'V':>9} {'tree':6}{'seconds':>10}{'exponent':>10}{'peak GB':>9}  more")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -190,7 +191,7 @@ def main() -> None:
         options.json.write_text(json.dumps(document, indent=2) + "\n")
 
 
-def _print(row: dict[str, object], last: dict[tuple[str, str], tuple[int, float]]) -> None:
+def _print(row: dict[str, Any], last: dict[tuple[str, str], tuple[int, float]]) -> None:
     more = dict(row)
     task, size, tree, seconds, peak = (more.pop(k) for k in ("task", "vertices", "tree", "seconds", "peak_gb"))
     key = (str(task), str(tree))

@@ -72,7 +72,7 @@ def opened(job: str, size: int) -> Session[Any]:
     return session
 
 
-def run(job: str, size: int) -> dict[str, object]:
+def run(job: str, size: int) -> dict[str, Any]:
     opening, session = timed(lambda: opened(job, size))
     if job == "form":
         session.solve()

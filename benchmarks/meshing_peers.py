@@ -18,15 +18,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from torchfair import Topology
+
 Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 _LIMIT = 120.0  # seconds of a call
 
 
 class PeerMesh(NamedTuple):
-    """What a peer made: vertices (V, 3), quads (F, 4), processor seconds."""
+    """What a peer made: vertices (V, 3), quads (F, 4) or the topology of ours, processor seconds."""
 
     vertices: NDArray[np.float64]
-    quads: NDArray[np.int64]
+    quads: NDArray[np.int64] | Topology
     seconds: float
 
 

@@ -9,6 +9,7 @@ import torch
 
 from torchfair.formfinding import SymmetricDesign, SymmetricSettings
 from torchfair.principal import principal_edges_of_lattice
+from torchfair.settings.symmetric_settings import Formulation
 from torchfair.shapes import Catenoid, Surface, Torus, principal_triangles
 
 Handles = dict[int, list[float]]
@@ -84,7 +85,7 @@ def variables_as_printed(vertices: int, edges: int, faces: int, *, with_energy: 
 
 def prepared(
     shape: Shape,
-    formulation: str,
+    formulation: Formulation,
     *,
     most_steps: int = 150,
     on_polylines: bool = False,

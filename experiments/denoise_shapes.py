@@ -31,14 +31,20 @@ from torchfair.formfinding.denoise.neighbourhoods import Neighbourhoods
 from torchfair.formfinding.denoise.unfolding import Sides
 from torchfair.geometry import ReferenceSurface, edge_lengths, face_normals, vertex_normals
 from torchfair.shapes import Paraboloid, Sphere, Surface, irregular_triangles
+from torchfair.viewing import MeshView, fit_camera
+from torchfair.viewing.shading import shade_faces
+from torchfair.viewing.sheet import CAPTION, GAP, MARGIN, Sheet
 
 NAME = "denoise_shapes"
-TABLE = "table.md"
+TABLE, PICTURE = "table.md", "shapes.png"
 METHODS = ("noisy", "denoise", "curved", "bilateral", "taubin")
+DRAWN = ("noisy", "denoise", "bilateral", "taubin")
 SHAPES, NOISES = ("block", "cylinder", "sphere", "saddle", "blend"), ("normal", "all")
 TAUBIN_ROUNDS = (5, 10, 20, 50)
 BILATERAL_WIDTHS = (0.2, 0.3, 0.45)
 BILATERAL_ROUNDS = (5, 20)
+EYE, UP = (torch.tensor(axis, dtype=torch.float64) for axis in ([0.5, -1.0, 0.7], [0.0, 0.0, 1.0]))
+Meshes = tuple[dict[str, Tensor], Topology]  # vertices by method
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,7 @@ class Config(ExperimentConfig):
     noises: tuple[str, ...] = setting(NOISES, "along normals, or in all directions", choices=NOISES)
     levels: tuple[float, ...] = setting((0.1, 0.3, 0.5), "noise in mean edge lengths", least=0.0)
     repeats: int = setting(3, "random generators", least=1)
+    width: int = setting(1600, "columns of pixels of the picture", least=300)
 
 
 @dataclass(frozen=True)
@@ -119,8 +126,8 @@ def filters(vertices: Tensor, topology: Topology) -> dict[str, list[Callable[[],
     }
 
 
-def rows(config: Config) -> Iterator[Report]:
-    """One row for each mesh, with a part for each method."""
+def rows(config: Config) -> Iterator[tuple[Report, Meshes]]:
+    """One row for each mesh, with a part for each method, and the meshes that they made."""
     for name in config.shapes:
         clean = shape(name, config.faces, config.seed)
         surface, topology = ReferenceSurface(*clean), clean[1]
@@ -130,9 +137,11 @@ def rows(config: Config) -> Iterator[Report]:
                     noisy = with_noise(clean, kind, level, config.seed + repeat)
                     row: Report = {"shape": name, "noise": kind, "level": level, "repeat": repeat}
                     row["noisy"] = against(clean, surface, noisy)
+                    made = {"noisy": noisy}
                     for method, curved in (("denoise", False), ("curved", True)):
                         begin = process_time()
                         result = denoise(noisy, topology, settings=DenoiseSettings(curved=curved))
+                        made[method] = result.vertices
                         row[method] = {
                             **against(clean, surface, result.vertices),
                             "estimate": result.after["noise"] / float(edge_lengths(*clean).mean()),
@@ -145,7 +154,8 @@ def rows(config: Config) -> Iterator[Report]:
                         tried = [candidate() for candidate in candidates]
                         best = min(tried, key=lambda vertices: float(angles(clean, vertices).mean()))
                         row[method] = against(clean, surface, best)
-                    yield row
+                        made[method] = best
+                    yield row, (made, topology)
 
 
 def table(found: list[Report]) -> str:
@@ -170,20 +180,40 @@ def table(found: list[Report]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def draw(chosen: list[tuple[Report, Meshes]], results: Results, width: int) -> None:
+    """A line for each shape: the noisy mesh, and what the methods make of it."""
+    panel = (width - 2 * MARGIN - (len(DRAWN) - 1) * GAP) // len(DRAWN)
+    views = [fit_camera(made["noisy"], towards_eye=EYE, up=UP, width=panel) for _, (made, _) in chosen]
+    sheet = Sheet(width, sum(CAPTION + size[0] for _, size in views) + MARGIN)
+    top = 0
+    for (row, (made, topology)), (camera, size) in zip(chosen, views, strict=True):
+        for column, method in enumerate(DRAWN):
+            left = MARGIN + column * (panel + GAP)
+            sheet.caption(f"{method}, {row[method]['degrees']:.1f}°", left, top, panel)
+            mesh = MeshView(made[method], topology, camera, size)
+            sheet.image(mesh.paint(shade_faces(made[method], topology, camera)), left, top + CAPTION)
+        top += CAPTION + size[0]
+    sheet.write(results.path(PICTURE), overwrite=results.force)
+
+
 def experiment(config: Config, results: Results) -> Report:
     """All meshes by all methods."""
-    found = []
-    for row in rows(config):
+    found, chosen = [], []
+    middle = config.levels[len(config.levels) // 2]
+    for row, meshes in rows(config):
         found.append(row)
+        if (row["noise"], row["level"], row["repeat"]) == (config.noises[0], middle, 0):
+            chosen.append((row, meshes))
         shown = ", ".join(f"{method} {row[method]['degrees']:.2f}" for method in METHODS)
         print(f"{row['shape']} {row['noise']} {row['level']:g} #{row['repeat']}: {shown} degrees", flush=True)
     results.text(TABLE, table(found))
+    draw(chosen, results, config.width)
     return {"rows": found}
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The experiment from the command line."""
-    return run_experiment(NAME, __doc__, Config, experiment, (TABLE,), arguments)
+    return run_experiment(NAME, __doc__, Config, experiment, (TABLE, PICTURE), arguments)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ import sys
 from dataclasses import dataclass
 
 import torch
+from _charts import BLUE, GREY, ORANGE, SKY, add_chart, add_legend
 from _common import ExperimentConfig, Report, Results, run_experiment, setting
 from _layouts import SADDLES
 from torch import Tensor
@@ -31,9 +32,10 @@ from torchfair import Topology
 from torchfair.geometry import edge_lengths
 from torchfair.shapes import Paraboloid, ShapeMesh, Surface, irregular_triangles, rotated_lattice
 from torchfair.stars import StarKind, classify_stars
+from torchfair.viewing.sheet import Sheet
 
 NAME = "saddle_samplings"
-TABLE = "table.md"
+TABLE, CHART = "table.md", "stars.png"
 SURFACES: dict[str, Surface] = {
     **SADDLES,
     "curvatures 1 : -0.25": Paraboloid(1.0, -0.25),
@@ -163,8 +165,33 @@ def _percent(part: int, whole: int) -> str:
     return "0" if not part else f"{share:.0f} %" if share >= 10 else f"{share:.2g} %"
 
 
+PARTS = {
+    "good saddles": (("good saddles",), BLUE),
+    "other saddles": (("other 1, 2, 1, 2", "2, 2, 1, 1", "3, 1, 1, 1", "other saddles"), SKY),
+    "neither convex nor saddle": (("neither",), ORANGE),
+    "convex": (("convex",), GREY),
+}
+
+
+def draw_shares(report: dict[str, dict[str, int]], results: Results) -> None:
+    """Stars by what they are: a bar for each sampling."""
+    sheet = Sheet(1300, 210 + 52 * len(report))
+    axes = add_chart(sheet, 360, 80, 880, 52 * len(report), x="percent of stars of valence six")
+    done = [0.0] * len(report)
+    for words, (columns, color) in PARTS.items():
+        shares = [100 * sum(row[name] for name in columns) / max(1, row["stars"]) for row in report.values()]
+        if any(shares):
+            axes.barh(range(len(report)), shares, 0.66, left=done, color=color, label=words)
+        done = [left + share for left, share in zip(done, shares, strict=True)]
+    axes.set_yticks(range(len(report)), list(report))
+    axes.set_xlim(0, 100)
+    axes.invert_yaxis()
+    add_legend(axes, loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=len(PARTS))
+    sheet.write(results.path(CHART), overwrite=results.force)
+
+
 def experiment(config: Config, results: Results) -> Report:
-    """Samples, counts, writes the table."""
+    """Samples, counts, writes the table and draws it."""
     by_surface = {
         surface: {kind: total([count(*mesh) for mesh in meshes]) for kind, meshes in kinds.items()}
         for surface, kinds in samplings(config).items()
@@ -174,12 +201,13 @@ def experiment(config: Config, results: Results) -> Report:
     text = table(overall)
     print(text, end="")
     results.text(TABLE, text)
+    draw_shares(overall, results)
     return {"all": overall, "surfaces": by_surface}
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The experiment from the command line."""
-    return run_experiment(NAME, __doc__, Config, experiment, [TABLE], arguments)
+    return run_experiment(NAME, __doc__, Config, experiment, [TABLE, CHART], arguments)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -53,15 +54,16 @@ def test_triangles_on_a_grid_meet_where_points_of_them_do(numbers: list[int]) ->
 
 
 def separation(a: np.ndarray, b: np.ndarray) -> float:
-    """Distance of two triangles, by quadratic programming over their corners' weights: slow, another way."""
-    from scipy.optimize import nnls
-
-    # min |sum s_i a_i - sum t_j b_j| with s, t >= 0 and sums 1, the sums by a large weight
-    big = 1e6
-    matrix = np.zeros((5, 6))
-    matrix[:3, :3], matrix[:3, 3:] = a.T, -b.T
-    matrix[3, :3] = matrix[4, 3:] = big
-    return float(nnls(matrix, np.array([0, 0, 0, big, big]), maxiter=1000)[1])
+    """Distance of two triangles: the least over all pairs of corners, sides and insides that is attained in both."""
+    parts = [list(part) for size in (1, 2, 3) for part in itertools.combinations(range(3), size)]
+    least = math.inf
+    for p, q in itertools.product([a[part] for part in parts], [b[part] for part in parts]):
+        directions = np.concatenate([p[1:] - p[0], q[0] - q[1:]]).T  # p[0] - q[0] + directions @ weights joins both
+        weights = np.linalg.lstsq(directions, q[0] - p[0])[0]
+        ours, others = np.split(weights, [len(p) - 1])
+        if min(*ours, 1 - ours.sum(), *others, 1 - others.sum()) >= -1e-12:
+            least = min(least, float(np.linalg.norm(p[0] - q[0] + directions @ weights)))
+    return least
 
 
 def test_meshes_without_crossings_have_none_not_even_flat_ones() -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import pytest
 import torch
 from helpers import DOUBLE, wavy_grid
 from torch import Tensor
 
+from torchfair import Topology
 from torchfair.constraints import (
     absolute_curvature_terms,
     between_stars,
@@ -48,7 +50,7 @@ def near(vertices: Tensor, weight: float) -> ElementTerm:
     return handle_terms(torch.arange(len(vertices)), vertices, weight=weight, name="near the start")[0]
 
 
-def rim(topology: object) -> dict[str, Tensor]:
+def rim(topology: Topology) -> dict[str, Tensor]:
     return {"vertices": topology.is_boundary_vertex}
 
 
@@ -207,7 +209,7 @@ def varied(case: Case, step: float) -> tuple[dict[str, Tensor], dict[str, Tensor
     return blocks, {name: value + step * wave(value, 2.0) for name, value in case.parameters.items()}
 
 
-def slopes(case: Case, **options: object) -> tuple[Tensor, object]:
+def slopes(case: Case, **options: object) -> tuple[Tensor, Any]:
     """The derivative along the variation by the backward pass."""
     blocks, parameters = varied(case, 0.0)
     leaves = [value.requires_grad_() for value in (*blocks.values(), *parameters.values())]

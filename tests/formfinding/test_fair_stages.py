@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Any
 
 import pytest
 import torch
@@ -103,7 +104,7 @@ def test_the_absolute_value_becomes_sharp_in_stages(continuation: tuple[float, .
     assert stages[:7] == [((i + 1) / 8, bluntest) for i in range(7)]
     assert stages[7:] == [(1.0, factor) for factor in (*continuation, 1.0)]
     for stage in stages:
-        terms = problem.terms(*stage)
+        terms: Any = problem.terms(*stage)
         losses = [term.loss.epsilon for term in terms if term.name == "normal variation"]
         assert losses == [pytest.approx(0.02 * stage.blur)]
 

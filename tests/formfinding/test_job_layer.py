@@ -307,7 +307,8 @@ def test_faults_name_what_is_in_the_way() -> None:
 def test_bounds_of_faces_stop_the_way_down() -> None:
     """A guard that lets nothing move: the fault says that it does not."""
     case = fair_handles()
-    case.recipe.problem.admits = lambda state, trial: torch.equal(state["vertices"], trial["vertices"])
+    recipe: Any = case.recipe
+    recipe.problem.admits = lambda state, trial: torch.equal(state["vertices"], trial["vertices"])
     _, info = case.layer(steps=5)(start=case.recipe.given)
     assert "does not let a face go" in info.point.fault
 

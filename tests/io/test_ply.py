@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -177,7 +178,7 @@ def test_what_trimesh_reads(tmp_path: Path, binary: bool) -> None:
 
     vertices, topology = wavy_grid(triangles=True)
     save_mesh(tmp_path / "m.ply", vertices, topology, binary=binary)
-    mesh = trimesh.load(tmp_path / "m.ply", process=False)
+    mesh: Any = trimesh.load(tmp_path / "m.ply", process=False)
     assert np.array_equal(mesh.vertices, vertices.numpy())
     assert np.array_equal(mesh.faces, topology.triangles.numpy())
 

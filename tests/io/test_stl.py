@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -125,7 +126,7 @@ def test_what_trimesh_reads(tmp_path: Path) -> None:
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     vertices, topology = wavy_grid(triangles=True)
     save_mesh(tmp_path / "m.stl", vertices, topology)
-    mesh = trimesh.load(tmp_path / "m.stl", process=False)
+    mesh: Any = trimesh.load(tmp_path / "m.stl", process=False)
     assert np.allclose(np.asarray(mesh.triangles), vertices[topology.triangles].numpy(), atol=1e-6)
     stored = np.frombuffer((tmp_path / "m.stl").read_bytes(), np.dtype("<f4, <f4, <f4, V38"), offset=84)
     normals = torch.nn.functional.normalize(face_area_vectors(vertices, topology), dim=1)

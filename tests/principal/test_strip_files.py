@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -22,7 +23,7 @@ from torchfair.principal import (
 from torchfair.shapes import Enneper, principal_triangles
 
 SVG = "{http://www.w3.org/2000/svg}"
-WRITERS = {".obj": save_strips_obj, ".svg": save_strips_svg, ".dxf": save_strips_dxf}
+WRITERS: dict[str, Callable[..., None]] = {".obj": save_strips_obj, ".svg": save_strips_svg, ".dxf": save_strips_dxf}
 
 
 @pytest.fixture(scope="module")

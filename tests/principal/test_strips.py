@@ -193,7 +193,7 @@ def test_limits_are_radii_of_curvature() -> None:
     torus = principal_triangles(Torus(), 8, 12, along="v")
     limits = strip_limits(torus.vertices, principal_edges_of_lattice(torus).polylines(), torus.normals)
     assert limits.height == math.inf
-    assert limits.depth == pytest.approx(torus.surface.minor_radius)
+    assert limits.depth == pytest.approx(Torus().minor_radius)
     points, normals, line = circle(16, 2.5, 0.0, 0.0)
     assert strip_limits(points, [line], -normals) == pytest.approx((2.5, math.inf))
     assert strip_limits(points, [], normals) == (math.inf, math.inf)

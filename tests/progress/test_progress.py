@@ -110,6 +110,11 @@ def test_nothing_happens_without_records() -> None:
     assert stream.getvalue() == ""
 
 
+def text_of(console: Console) -> str:
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
 def terminal(width: int = 120) -> Console:
     return Console(force_terminal=True, file=io.StringIO(), width=width, color_system=None, legacy_windows=False)
 
@@ -118,7 +123,7 @@ def test_terminal_redraws_one_line_in_place(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(progress, "_REFRESH", 0.0)
     console = terminal()
     run(ProgressDisplay(60, console=console), 3)
-    written = console.file.getvalue()
+    written = text_of(console)
     for iteration in range(4):
         assert f"iteration {iteration}/60" in written
     assert "E 121.3" in written
@@ -132,7 +137,7 @@ def test_terminal_is_repainted_seldom_but_shows_the_end(monkeypatch: pytest.Monk
     monkeypatch.setattr(progress.time, "monotonic", lambda: 1000.0)
     console = terminal()
     run(ProgressDisplay(60, console=console), 50)
-    written = console.file.getvalue()
+    written = text_of(console)
     assert "iteration 0/60" in written
     assert "iteration 25/60" not in written
     assert "iteration 50/60" in written
@@ -142,7 +147,7 @@ def test_narrow_terminals_lose_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "_REFRESH", 0.0)
     console = terminal(width=40)
     run(ProgressDisplay(60, console=console), 3)
-    words = console.file.getvalue().split()
+    words = text_of(console).split()
     assert "damping" in words
     assert "121.3" in words
 
@@ -157,13 +162,13 @@ def test_cursor_returns_after_an_interruption() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    assert console.file.getvalue().rstrip().endswith("\x1b[?25h")
+    assert text_of(console).rstrip().endswith("\x1b[?25h")
 
 
 def test_a_console_that_is_no_terminal_gets_plain_lines() -> None:
     console = Console(force_terminal=False, file=io.StringIO())
     run(ProgressDisplay(60, console=console, every=1), 2)
-    lines = console.file.getvalue().splitlines()
+    lines = text_of(console).splitlines()
     assert [line.split()[1] for line in lines] == ["0/60", "1/60", "2/60"]
 
 

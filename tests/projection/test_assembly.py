@@ -8,7 +8,7 @@ import torch
 from helpers import DOUBLE, wavy_grid
 from torch import Tensor
 
-from torchfair.linear import ConjugateGradients, DenseQR, PardisoDirect, RslabDirect, ScipyDirect
+from torchfair.linear import ConjugateGradients, DenseQR, LinearSolver, PardisoDirect, RslabDirect, ScipyDirect
 from torchfair.projection import ElementTerm, SmoothAbsolute, portions
 from torchfair.projection.layout import Layout
 from torchfair.projection.linear_system import LinearSystem
@@ -151,7 +151,7 @@ SOLVERS += [solver() for solver in (RslabDirect, PardisoDirect) if solver.availa
 
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda s: s.name)
 @pytest.mark.parametrize("fix", [False, True])
-def test_every_solver_solves_the_damped_normal_equations(solver: object, fix: bool) -> None:
+def test_every_solver_solves_the_damped_normal_equations(solver: LinearSolver, fix: bool) -> None:
     state, terms, structure = mixed_problem(fix)
     residual, jacobian = naive_system(state, terms, structure.free)
     damping = torch.linspace(0.1, 1.0, structure.num_unknowns, dtype=DOUBLE)

@@ -68,11 +68,11 @@ def assert_same(together: list[ProjectionResult], alone: list[ProjectionResult])
             assert (row.name, row.elements, row.weight) == (twin.name, twin.elements, twin.weight)
             numbers = (twin.mean, twin.largest, twin.merit)
             assert (row.mean, row.largest, row.merit) == pytest.approx(numbers, abs=1e-8)
-        for step, twin in zip(mine.history, other.history, strict=True):
-            assert (step.accepted, step.iteration) == (twin.accepted, twin.iteration)
-            assert step.merit == pytest.approx(twin.merit, rel=1e-9)
+        for step, mate in zip(mine.history, other.history, strict=True):
+            assert (step.accepted, step.iteration) == (mate.accepted, mate.iteration)
+            assert step.merit == pytest.approx(mate.merit, rel=1e-9)
             assert step.damping == pytest.approx(
-                twin.damping, rel=1e-2, nan_ok=True
+                mate.damping, rel=1e-2, nan_ok=True
             )  # of vanishing differences at the end
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
@@ -71,7 +73,7 @@ def test_a_flat_star_has_no_cost_and_a_finite_model() -> None:
     torch.testing.assert_close(model(loss, nothing, other), other.square().sum(1) / 0.02)
 
 
-def second_derivatives(loss: object, residuals: Tensor, way: Tensor) -> tuple[Tensor, Tensor]:
+def second_derivatives(loss: Any, residuals: Tensor, way: Tensor) -> tuple[Tensor, Tensor]:
     """Gradient (n, 6), and second derivatives along a way (n, 6)."""
     there = residuals.clone().requires_grad_()
     (slope,) = torch.autograd.grad(loss.value(there).sum(), there, create_graph=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,7 +16,7 @@ KINDS = (FairSettings, FormSettings, SymmetricSettings)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_preset_is_found_by_name_and_survives_a_file(kind: type, tmp_path: Path) -> None:
+def test_a_preset_is_found_by_name_and_survives_a_file(kind: Any, tmp_path: Path) -> None:
     assert set(presets_of(kind)) == {"paper"}
     settings = preset_settings("paper", kind)
     assert settings == kind.paper() != kind()
@@ -25,7 +26,7 @@ def test_a_preset_is_found_by_name_and_survives_a_file(kind: type, tmp_path: Pat
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_numbers_of_a_preset_go_by_the_papers_names(kind: type) -> None:
+def test_numbers_of_a_preset_go_by_the_papers_names(kind: Any) -> None:
     found = preset_settings("paper,w_reg=0.25,w_fair=3,w_target=0.5,steps=7", kind)
     assert found == kind.paper(w_reg=0.25, w_fair=3.0, w_target=0.5, steps=7)
     assert found.projection.initial_damping == 0.25
