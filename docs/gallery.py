@@ -13,8 +13,9 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images" / "gallery"
-WIDTH, COLOURS = 760, 64
+WIDTH, MARGIN, COLOURS = 760, 16, 64
 PICTURES = {
+    "denoise_shapes": "shapes.png",
     "fig01_reflections": "reflections.png",
     "fig03_mean_curvature": "fields.png",
     "fig05_annulus": "strips.png",
@@ -26,12 +27,14 @@ PICTURES = {
     "fig13_boundaries": "square_to_circle.png",
     "fig14_design": "reflections.png",
     "fig14_reflections": "reflections.png",
-    "fig14h_polylines": "design.png",
+    "fig14h_polylines": "reflections.png",
     "fig15_tangent_planes": "pipe.png",
     "fig16_canopies": "least_c.png",
     "fig17_pipelines": "pipelines.png",
     "fig18_hybrid_roof": "overlay.png",
     "fig21_principal_remeshing": "edges.png",
+    "fig_reflection_ranking": "reflections.png",
+    "optimise_reflection": "reflections.png",
     "polar_duals": "dual.png",
     "repair_saddles": "saddle_term.png",
     "rounding_off": "rounding_off.png",
@@ -79,10 +82,15 @@ def page() -> str:
 
 
 def shrink(source: Path, target: Path) -> int:
-    """Writes a small copy of a picture and returns its size in bytes."""
-    from PIL import Image
+    """Writes a small copy of a picture without its white border, and returns its size in bytes."""
+    from PIL import Image, ImageChops
 
     picture = Image.open(source).convert("RGB")
+    inside = ImageChops.difference(picture, Image.new("RGB", picture.size, "white")).getbbox()
+    if inside:
+        left, top, right, bottom = inside
+        ends = min(right + MARGIN, picture.width), min(bottom + MARGIN, picture.height)
+        picture = picture.crop((max(left - MARGIN, 0), max(top - MARGIN, 0), *ends))
     picture.thumbnail((WIDTH, WIDTH), Image.Resampling.LANCZOS)
     picture.quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
     return target.stat().st_size

@@ -27,6 +27,7 @@ def energies(vertices: Tensor, topology: Topology) -> Tensor:
     assert_type(smoothness.per_edge(vertices), Tensor)
     assert_type(Stripes(torch.tensor([[0.0, 0.0, 1.0]]), 8.0)(vertices), Tensor)
     assert_type(torchfair.energies.normal_variation(vertices, topology), Tensor)
+    assert_type(torchfair.geometry.face_normals(vertices=vertices, topology=topology), Tensor)
     return smoothness(vertices) + 0.1 * Planarity(topology)(vertices)
 
 
@@ -47,6 +48,7 @@ def mistakes(vertices: Tensor, topology: Topology) -> None:
     NormalVariation(topology)(topology)  # type: ignore[arg-type]
     WillmoreEnergy(topology, density="median")  # type: ignore[arg-type]
     load_mesh("roof.obj", weld="yes")  # type: ignore[arg-type]
+    torchfair.geometry.face_normals(vertices, mesh=topology)  # type: ignore[call-arg]
 
 
 def main() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Concatenate, ParamSpec
+from typing import Any, TypeVar, cast
 
 from torch import Tensor
 
@@ -12,20 +12,19 @@ from .._precision import in_single_at_least
 from ..topology import Topology
 from ._unit import in_its_unit
 
-Arguments = ParamSpec("Arguments")
-Quantity = Callable[Concatenate[Tensor, Topology, Arguments], Tensor]
+Quantity = TypeVar("Quantity", bound=Callable[..., Tensor])  # as it is, so that arguments have their names
 
 
-def of_any_size(power: int) -> Callable[[Quantity[Arguments]], Quantity[Arguments]]:
+def of_any_size(power: int) -> Callable[[Quantity], Quantity]:
     """Decorator of quantities of ``(vertices, topology)`` that are a length to some ``power``: of meshes of any size.
 
     Squares and products of lengths inside would overflow or vanish, and pass for faces without area: zero, where the
     quantity is large. In single precision at least. A result beyond the range of the dtype is infinite, or zero.
     """
 
-    def decorated(function: Quantity[Arguments]) -> Quantity[Arguments]:
+    def decorated(function: Quantity) -> Quantity:
         @functools.wraps(function)
-        def scaled(vertices: Tensor, topology: Topology, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Tensor:
+        def scaled(vertices: Tensor, topology: Topology, *args: Any, **kwargs: Any) -> Tensor:
             topology.check_vertices(vertices)
             vertices, unit = in_its_unit(vertices)
             value = function(vertices, topology, *args, **kwargs)
@@ -34,7 +33,6 @@ def of_any_size(power: int) -> Callable[[Quantity[Arguments]], Quantity[Argument
                 value = value * factor
             return value
 
-        quantity: Quantity[Arguments] = in_single_at_least(scaled)  # type: ignore[arg-type]  # arguments by name, too
-        return quantity
+        return cast(Quantity, in_single_at_least(scaled))
 
     return decorated

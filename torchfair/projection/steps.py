@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
-from typing import Concatenate, ParamSpec, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import torch
 from torch import Tensor
@@ -30,19 +30,18 @@ from .system import Evaluation
 from .trials import Guard, Trials
 from .vanishing import vanishing
 
-_P = ParamSpec("_P")
-_R = TypeVar("_R")
+_F = TypeVar("_F", bound=Callable[..., object])  # as it is, so that arguments have their names
 
 
-def _plain(function: Callable[Concatenate[Problem, _P], _R]) -> Callable[Concatenate[Problem, _P], _R]:
+def _plain(function: _F) -> _F:
     """Without gradients, and with few threads for small problems."""
 
     @wraps(function)
-    def plainly(problem: Problem, *arguments: _P.args, **options: _P.kwargs) -> _R:
+    def plainly(problem: Problem, *arguments: Any, **options: Any) -> object:
         with torch.no_grad(), threads_for(problem.layout.num_unknowns, problem.structure.device):
             return function(problem, *arguments, **options)
 
-    return cast(Callable[Concatenate[Problem, _P], _R], plainly)
+    return cast(_F, plainly)
 
 
 @_plain
