@@ -16,7 +16,10 @@ from torchfair.reflection import Stripes, mirror_directions
 from torchfair.triangulation import triangulate
 
 STRIPES = Stripes(torch.tensor([[1.0, 0.3, 0.2], [0.1, -0.4, 1.0]]), 1.0, 2.0)
-EACH_KIND: dict[str, type[OrthographicCamera] | type[PerspectiveCamera]] = {"parallel": OrthographicCamera, "perspective": PerspectiveCamera}
+EACH_KIND: dict[str, type[OrthographicCamera] | type[PerspectiveCamera]] = {
+    "parallel": OrthographicCamera,
+    "perspective": PerspectiveCamera,
+}
 
 
 def vector(*numbers: float) -> Tensor:
