@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import inspect
 import json
 import re
@@ -108,6 +109,20 @@ def test_version_and_date_are_the_same_everywhere() -> None:
     newest = changes.split("\n## ")[2 if "## Unreleased" in changes else 1]
     assert re.findall(r"^### (.*)$", newest, re.M) == ["Changed behaviour", "Added", "Faster", "Fixed"]
     assert "**Changed behaviour" not in changes  # it has a section, which those look for who update
+
+
+def test_an_index_page_shows_the_readme_without_links_that_lead_nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    root = Path(__file__).resolve().parent.parent
+    monkeypatch.syspath_prepend(str(root))
+    readme_of_packages = importlib.import_module("hatch_build").readme_of_packages
+    text = (root / "README.md").read_text(encoding="utf-8")
+    links = set(re.findall(r"\]\(([^)]*)\)", text))
+    inside = {link for link in links if link.startswith("#")}
+    assert len(links - inside) > 10
+    assert set(re.findall(r"\]\(([^)]*)\)", readme_of_packages(text, ""))) == inside
+    elsewhere = set(re.findall(r"\]\(([^)]*)\)", readme_of_packages(text, "https://example.org/v1/")))
+    assert elsewhere == inside | {f"https://example.org/v1/{link}" for link in links - inside}
+    assert all((root / link).exists() for link in links - inside)
 
 
 def test_errors() -> None:

@@ -30,9 +30,10 @@ def refuse_recording(what: str) -> None:
 
     ``torch.compile`` is not refused: there ``what`` is left to eager mode.
     """
-    if torch.compiler.is_compiling() and not torch.compiler.is_exporting():
+    exporting = _is_exporting()
+    if torch.compiler.is_compiling() and not exporting:
         return
-    if torch.compiler.is_exporting() or torch._C._get_tracing_state() is not None or _proxies_are_made():
+    if exporting or torch._C._get_tracing_state() is not None or _proxies_are_made():
         raise TorchfairError(
             f"{what} cannot be recorded (export, make_fx, jit.trace, torch.func.linearize): which face is seen where "
             "depends on the vertices. Call it in eager mode, leave it out of what is exported, and use torch.func.jvp "
@@ -44,6 +45,11 @@ def refuse_recording(what: str) -> None:
             "seen where depends on the vertices. Give it the batch as leading dimensions (*batch, V, 3), and take "
             "derivatives row by row."
         )
+
+
+def _is_exporting() -> bool:
+    asked = getattr(torch.compiler, "is_exporting", None)  # from torch 2.7 on
+    return asked is not None and bool(asked())
 
 
 def _proxies_are_made() -> bool:

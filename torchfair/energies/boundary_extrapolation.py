@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from .._loading import safe_to_load
+from .._tables import outside_of_transforms
 from ..geometry._ops import gather, scatter_sum
 from ..topology import Topology
 
@@ -41,7 +42,6 @@ class BoundaryExtrapolation(NamedTuple):
         return torch.where(self.replaced, areas * filled, values)
 
 
-@torch.inference_mode(False)
 def boundary_extrapolation(topology: Topology) -> BoundaryExtrapolation:
     """Tables by which boundary vertices take the mean density (value over area) of their interior neighbours.
 
@@ -49,14 +49,18 @@ def boundary_extrapolation(topology: Topology) -> BoundaryExtrapolation:
     neighbours that have a density by then, and so on until all have one. Pieces of the mesh without any
     interior vertex keep their own. It depends on the topology only.
     """
+    with outside_of_transforms():
+        return _found(topology)
+
+
+def _found(topology: Topology) -> BoundaryExtrapolation:
     from scipy.sparse import coo_array, diags_array
 
     size = topology.num_vertices
-    # By way of lists: inside a function transform tensors do not turn into arrays.
-    start, stop = np.array(topology.edges.tolist(), np.int64).reshape(-1, 2).T
+    start, stop = topology.edges.cpu().numpy().T
     ends, others = np.concatenate([start, stop]), np.concatenate([stop, start])
     beside = coo_array((np.ones(len(ends)), (ends, others)), shape=(size, size)).tocsr()
-    complete = ~np.array(topology.is_boundary_vertex.tolist(), bool)
+    complete = ~topology.is_boundary_vertex.cpu().numpy()
     known, shares = complete, diags_array(complete.astype(float)).tocsr()
     while True:
         counts = beside @ known.astype(float)
