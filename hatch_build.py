@@ -1,4 +1,4 @@
-"""The README of the packages: an index page shows it without the files beside it, so links to them would lead nowhere."""
+"""The README of the packages: index pages show it without the files beside it, so links to them would lead nowhere."""
 
 from __future__ import annotations
 
