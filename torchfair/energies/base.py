@@ -21,9 +21,11 @@ Reduction = Literal["none", "mean", "sum"]
 class _MadeForTraining(ABCMeta):
     """Tensors that modules make for themselves are ordinary ones, even if they are made under ``inference_mode``."""
 
-    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
-        with torch.inference_mode(False):
-            return super().__call__(*args, **kwargs)
+    if not TYPE_CHECKING:  # checkers look at __init__; pyright would take a module for Any
+
+        def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+            with torch.inference_mode(False):
+                return super().__call__(*args, **kwargs)
 
     @property
     def __signature__(cls) -> inspect.Signature:
