@@ -73,7 +73,7 @@ def page() -> str:
     for figure, name, command, claim, result in entries():
         title = f"Figure {figure}" if figure[0].isdigit() else figure.capitalize()
         if not figure[0].isalnum():  # of our own
-            title = name.replace("_", " ").capitalize()
+            title = name.removeprefix("fig_").replace("_", " ").capitalize()
         parts += [f"## {title}", f"**Claim.** {claim}", f"**Result.** {result}"]
         if (IMAGES / f"{name}.png").exists():
             parts.append(f"![{name}](images/gallery/{name}.png)")
