@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -129,7 +130,7 @@ def test_interruption_writes_the_best_mesh(
 
     original = ProgressDisplay.__call__
 
-    def interrupt(self: ProgressDisplay, record: object) -> None:
+    def interrupt(self: ProgressDisplay, record: Any) -> None:
         original(self, record)
         if record.iteration > 0 and record.accepted:
             raise KeyboardInterrupt

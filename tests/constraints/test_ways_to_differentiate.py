@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 import torch
@@ -85,7 +85,8 @@ def test_a_problem_keeps_its_way_for_other_terms_members_and_solvers() -> None:
 
     term = spring(jacobian=closed)
     problem = GuidedProjection(POINTS, [term], derivatives="jacrev")
-    for other in (problem, problem.with_terms([replace(term, weight=2.0)]), problem.solved_by("dense")):
+    others: list[Any] = [problem, problem.with_terms([replace(term, weight=2.0)]), problem.solved_by("dense")]
+    for other in others:
         other.solve(POINTS, settings=ProjectionSettings(solver=other.solver))
     problem.solve_batch({"x": torch.stack([POINTS["x"], 2.0 * POINTS["x"]])})
     assert not asked

@@ -71,7 +71,7 @@ def _() -> Whole:
     return (
         c.polyline_fairness_terms(topology, weight=WEIGHT),
         state,
-        float(polyline_fairness(*state.values(), topology)),
+        float(polyline_fairness(state["vertices"], topology)),
     )
 
 
