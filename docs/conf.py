@@ -47,7 +47,7 @@ napoleon_google_docstring = True
 nitpicky = True  # a reference that leads nowhere is a warning
 nitpick_ignore_regex = [
     ("py:class", r"(torch|abc|collections|scipy|numpy|pathlib|os)\..*"),
-    ("py:class", r"Tensor|Path|Console|Document|BackgroundServer|Ints|Floats"),  # imported for types only
+    ("py:class", r"Tensor|Path|Console|Document|BackgroundServer|Ints|Floats|Callback"),  # imported for types only
     ("py:class", r"torchfair\..*\.[A-Z]"),  # type variables
     ("py:class|py:obj", r"(typing\.Literal|tuple|dict)\[.*"),  # what a default in a signature is cut into
 ]
