@@ -99,6 +99,7 @@ def distance_limit_terms(planes: Feet, limits: Tensor, *, weight: float, block: 
             weight=weight,
             refresh=refresh,
             jacobian=limited_slopes,
+            silent=True,
             batched=True,
         )
     ]

@@ -31,7 +31,11 @@ def corner_angle_terms(
     """
     angle, slope = partial(angle_barrier, smallest=smallest), partial(angle_barrier_slope, smallest=smallest)
     stencil = [(block, corner_stencil(topology))]
-    return [ElementTerm("corner angles", angle, stencil, data=(safe,), weight=weight, jacobian=slope, batched=True)]
+    return [
+        ElementTerm(
+            "corner angles", angle, stencil, data=(safe,), weight=weight, jacobian=slope, silent=True, batched=True
+        )
+    ]
 
 
 def _legs(x: Tensor) -> tuple[Tensor, Tensor]:
@@ -88,7 +92,14 @@ def face_area_terms(
     slope = partial(area_barrier_slope, smallest=smallest, safe=safe)
     return [
         ElementTerm(
-            "face areas", share, [(block, corners)], data=(areas[numbers],), weight=weight, jacobian=slope, batched=True
+            "face areas",
+            share,
+            [(block, corners)],
+            data=(areas[numbers],),
+            weight=weight,
+            jacobian=slope,
+            silent=True,
+            batched=True,
         )
         for numbers, corners in topology.faces_by_size.values()
     ]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
 from ..linear.sparse import csr_matrix
 from .affine import AffinePart
 from .layout import Layout
-from .node_sums import NodeSums
+from .node_sums import Felt, NodeSums
 
 
 class BlockDiagonal:
@@ -32,13 +34,13 @@ class BlockDiagonal:
         offsets = torch.cat([torch.zeros(1, dtype=torch.int32), torch.cat(lengths).cumsum(0, dtype=torch.int32)])
         self._columns, self._offsets = torch.cat(columns).to(like.device), offsets.to(like.device)
 
-    def values(self, jacobians: list[Tensor]) -> Tensor:
-        """Blocks of ``J^T J`` for element Jacobians ``(m, K, n)``, flat.
+    def values(self, jacobians: Sequence[Tensor], felt: Felt | None = None) -> Tensor:
+        """Blocks of ``J^T J`` for element Jacobians ``(m, K, n)``, flat; ``felt`` as for :class:`NodeSums`.
 
         Where an element names a node twice, the mixed products are left out.
         """
         values = self._like.new_zeros(self._size)
-        for first, a, b, entries in self._sums.blocks(jacobians):
+        for first, a, b, entries in self._sums.blocks(jacobians, felt):
             here = self._block(values, first)
             here[:, a, b] = entries
         if self._affine is not None:

@@ -61,7 +61,8 @@ def _lost(state: ProjectionState) -> Tensor:
     They have run away to where the merit does not depend on them, as far as numbers can tell: no minimum.
     """
     system = state.linearised.system
-    residuals = [r.square().sum(0).expand(j.shape[1:]) for r, j in zip(system.residuals, system.jacobians, strict=True)]
+    pairs = zip(system.residuals, system.structure.compiled, strict=True)
+    residuals = [r.square().sum(0).expand(sum(compiled.widths), -1) for r, compiled in pairs]
     return (system.diagonal == 0.0) & (state.linearised.stiffness > 0.0) & (system.structure.scatter(residuals) > 0.0)
 
 

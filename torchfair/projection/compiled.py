@@ -36,8 +36,8 @@ class CompiledTerm:
         """(K, n) flat number of each unknown of each element; made anew whenever it is asked for."""
         return self.unknowns_of(slice(None))
 
-    def unknowns_of(self, elements: slice) -> Tensor:
-        """Those of some elements."""
+    def unknowns_of(self, elements: slice | Tensor) -> Tensor:
+        """Those of some elements, a range or their numbers."""
         rows = []
         for name, whole in self.term.stencil:
             index = whole[elements]

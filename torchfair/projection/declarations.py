@@ -29,7 +29,7 @@ def check_declarations(term: ElementTerm, arguments: Arguments) -> None:
         ShapeError: a closed form has the wrong shape.
     """
     transformed = term.derivatives in ("jacrev", "jacfwd")
-    if not term.batched and not term.has_closed_form and not transformed:
+    if not (term.batched or term.has_closed_form or transformed or term.silent):
         return
     count, device = term.num_elements, term.stencil[0][1].device
     chosen = torch.linspace(0, count - 1, min(count, _ELEMENTS), device=device).round().long()
@@ -40,6 +40,19 @@ def check_declarations(term: ElementTerm, arguments: Arguments) -> None:
         term.automatic_derivatives(few, "sums")
     if term.has_closed_form:
         _check_derivative(term, few, chosen.tolist())
+    if term.silent:
+        _check_silence(term, few, chosen.tolist())
+
+
+def _check_silence(term: ElementTerm, arguments: tuple[Tensor, ...], elements: list[int]) -> None:
+    """Where residuals are zero, derivatives have to be."""
+    values, jacobians = term.linearised(arguments)
+    bad = torch.nonzero((values == 0.0).all(1) & (jacobians != 0.0).any(2).any(1)).flatten().tolist()
+    if bad:
+        raise TorchfairError(
+            f"term '{term.name}' is declared silent, but in element {elements[bad[0]]}, where its residual is zero, "
+            "its derivative is not: leave out silent=True"
+        )
 
 
 def _check_rows(term: ElementTerm, arguments: tuple[Tensor, ...]) -> None:

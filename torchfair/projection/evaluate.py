@@ -96,8 +96,10 @@ def check_linearised(structure: Structure, system: LinearSystem) -> None:
     """
     if bool(torch.isfinite(system.gradient).all()):
         return
-    for compiled, jacobians in zip(structure.compiled, system.jacobians, strict=True):
+    for number, (compiled, jacobians) in enumerate(zip(structure.compiled, system.jacobians, strict=True)):
         bad = rows(~torch.isfinite(jacobians.permute(2, 0, 1)))
+        chosen = system.felt[number]
+        bad = bad if chosen is None else chosen[bad].tolist()
         if bad:
             raise TorchfairError(
                 f"the derivative of term '{compiled.term.name}' is not finite at the start, elements {bad[:5]}, "

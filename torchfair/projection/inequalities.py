@@ -47,14 +47,19 @@ class Inequalities:
     def heeding(self, heeded: Tensor) -> LinearSystem:
         """The system that takes inequalities (n,) bool for equations and leaves the others out."""
         whole, start = self._whole, 0
-        jacobians, residuals = list(whole.jacobians), list(whole.residuals)
+        jacobians, residuals, felt = list(whole.jacobians), list(whole.residuals), list(whole.felt)
         for number in self._numbers:
             values = residuals[number]
             chosen = heeded[start : start + values.numel()].view(values.shape)
             start += values.numel()
             residuals[number] = values * chosen
+            if whole.structure.partial[number]:
+                known, some = felt[number], chosen.any(0)
+                places = torch.nonzero(some if known is None else some[known]).squeeze(1)
+                felt[number] = places if known is None else known[places]
+                jacobians[number], chosen = jacobians[number][..., places], chosen[:, felt[number]]
             jacobians[number] = jacobians[number] * chosen[:, None]
-        return LinearSystem(whole.structure, jacobians, residuals, whole.roots, whole.affine_residual)
+        return LinearSystem(whole.structure, jacobians, residuals, whole.roots, whole.affine_residual, felt)
 
     def without(self, members: Collection[int]) -> Inequalities:
         """The same without some members of a batch, see :meth:`LinearSystem.without`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,9 @@ from torch import Tensor
 
 from ..linear.block_inverse import block_inverse
 from .loss import apply_root
+from .node_sums import Felt
 from .portions import portions
+from .row_pattern import RowPattern
 
 if TYPE_CHECKING:
     from .system import Evaluation, Structure
@@ -23,10 +25,13 @@ class LinearSystem:
     Fixed unknowns have zero columns in ``J``: without damping the normal matrix is singular there.
 
     Attributes:
-        jacobians: for each term of ``Structure.compiled`` ``(m, K, n)``, unknowns as in ``CompiledTerm``.
-        residuals: likewise ``(m, n)``.
-        roots: square roots of the weights that both are scaled by, see ``ElementTerm.roots``.
+        jacobians: for each term of ``Structure.compiled`` ``(m, K, n)``, unknowns as in ``CompiledTerm``; of the n
+            elements that are felt.
+        residuals: likewise ``(m, n)``, of all elements.
+        roots: square roots of the weights that both are scaled by, see ``ElementTerm.roots``; of all elements.
         affine_residual: of the linear terms.
+        felt: for each term the numbers (n,) of those of its elements whose Jacobians are not zero; None for all
+            elements, which is so where ``Structure.partial`` is not.
     """
 
     def __init__(
@@ -36,12 +41,36 @@ class LinearSystem:
         residuals: list[Tensor],
         roots: list[Tensor],
         affine_residual: Tensor | None,
+        felt: Felt | None = None,
     ) -> None:
         self.structure = structure
         self.jacobians = jacobians
         self.residuals = residuals
         self.roots = roots
         self.affine_residual = affine_residual
+        self.felt: Felt = felt or [None] * len(jacobians)
+
+    def of_felt(self, parts: Iterable[Tensor]) -> list[Tensor]:
+        """Of values (m, n) of all elements of the terms those of the elements that are felt."""
+        return [p if chosen is None else p[:, chosen] for p, chosen in zip(parts, self.felt, strict=True)]
+
+    def elements(self, number: int) -> slice | Tensor:
+        """The elements of a term that are felt: all, or their numbers."""
+        chosen = self.felt[number]
+        return slice(None) if chosen is None else chosen
+
+    @property
+    def whole_jacobians(self) -> list[Tensor]:
+        """``(m, K, n)`` of all elements, with zeros where they are not felt."""
+        return [self._of_all(number, jacobian) for number, jacobian in enumerate(self.jacobians)]
+
+    def _of_all(self, number: int, part: Tensor) -> Tensor:
+        chosen = self.felt[number]
+        if chosen is None:
+            return part
+        whole = part.new_zeros(*part.shape[:-1], self.structure.compiled[number].term.num_elements)
+        whole[..., chosen] = part
+        return whole
 
     def without(self, members: Collection[int]) -> LinearSystem:
         """The same without what some members of a batch have that is not linear: zeros there."""
@@ -59,6 +88,7 @@ class LinearSystem:
             [kept(residual) for residual in self.residuals],
             roots,
             self.affine_residual,
+            self.felt,
         )
 
     @cached_property
@@ -72,7 +102,7 @@ class LinearSystem:
         return self._pulled_back(residuals, other.affine)
 
     def _pulled_back(self, residuals: Sequence[Tensor], affine: Tensor | None) -> Tensor:
-        total = self.structure.scatter(self.jacobians, residuals)
+        total = self.structure.scatter(self.jacobians, self.of_felt(residuals), self.felt)
         if self.structure.affine is not None and affine is not None:
             total += self.structure.affine.gradient(affine)
         return total
@@ -80,12 +110,12 @@ class LinearSystem:
     def changes(self, step: Tensor) -> tuple[list[Tensor], Tensor | None]:
         """By how much a step (N,) changes the residuals of the model: of each term (m, n), and of the linear terms."""
         terms = []
-        for compiled, jacobian in zip(self.structure.compiled, self.jacobians, strict=True):
-            parts = [
-                torch.einsum("mkn,kn->mn", jacobian[..., elements], step[compiled.unknowns_of(elements)])
-                for elements in portions(jacobian.shape[2], jacobian)
-            ]
-            terms.append(parts[0] if len(parts) == 1 else torch.cat(parts, 1))
+        for number, (compiled, jacobian) in enumerate(zip(self.structure.compiled, self.jacobians, strict=True)):
+            chosen, parts = self.felt[number], []
+            for elements in portions(jacobian.shape[2], jacobian):
+                unknowns = compiled.unknowns_of(elements if chosen is None else chosen[elements])
+                parts.append(torch.einsum("mkn,kn->mn", jacobian[..., elements], step[unknowns]))
+            terms.append(self._of_all(number, parts[0] if len(parts) == 1 else torch.cat(parts, 1)))
         return terms, None if self.structure.affine is None else self.structure.affine.change(step)
 
     def predicted_fall(self, step: Tensor) -> Tensor:
@@ -106,24 +136,32 @@ class LinearSystem:
         Used for scaling only: where an element names a node twice, the mixed products are left out, here
         and in :attr:`diagonal_blocks`.
         """
-        total = self.structure.scatter(self.jacobians, self.jacobians)
+        total = self.structure.scatter(self.jacobians, self.jacobians, self.felt)
         return total if self.structure.affine is None else total + self.structure.affine.diagonal
 
     @cached_property
     def diagonal_blocks(self) -> dict[str, Tensor]:
         """Diagonal blocks ``(n, d, d)`` of ``J^T J``, by block of variables."""
         diagonal = self.structure.block_diagonal
-        return diagonal.split(diagonal.values(self.jacobians))
+        return diagonal.split(diagonal.values(self.jacobians, self.felt))
 
     @cached_property
     def _matrices(self) -> tuple[Tensor, Tensor]:
-        return self.structure.row_pattern(tuple(j.shape[0] for j in self.jacobians)).matrices(self.jacobians)
+        return self.structure.row_pattern(tuple(j.shape[0] for j in self.jacobians)).matrices(self.whole_jacobians)
 
     @cached_property
-    def _term_matrices(self) -> tuple[Tensor, Tensor]:
-        """The Jacobian of the terms that are not linear and its transpose."""
-        outputs = tuple(j.shape[0] for j in self.jacobians)
-        return self.structure.row_pattern(outputs, whole=False).matrices(self.jacobians)
+    def _term_matrices(self) -> list[tuple[Tensor, Tensor]]:
+        """The Jacobian of the terms that are not linear and its transpose: of those with all elements, of others."""
+        partial = self.structure.partial
+        whole = [j for j, some in zip(self.jacobians, partial, strict=True) if not some]
+        found = [self.structure.row_pattern(tuple(j.shape[0] for j in whole), whole=False).matrices(whole)]
+        chosen = [number for number, some in enumerate(partial) if some and self.jacobians[number].shape[2]]
+        if chosen:
+            unknowns = (self.structure.compiled[number].unknowns_of(self.elements(number)) for number in chosen)
+            jacobians = [self.jacobians[number] for number in chosen]
+            outputs = [jacobian.shape[0] for jacobian in jacobians]
+            found.append(RowPattern(unknowns, outputs, None, self.structure.like).matrices(jacobians))
+        return found
 
     @property
     def jacobian(self) -> Tensor:
@@ -141,6 +179,11 @@ class LinearSystem:
         parts = [r.reshape(-1) for r in self.residuals]
         return torch.cat(parts if self.affine_residual is None else [*parts, self.affine_residual])
 
+    def release(self) -> None:
+        """Forgets the matrices, which are made anew where they are asked for."""
+        for name in ("_matrices", "_term_matrices", "diagonal_blocks", "lower_values"):
+            self.__dict__.pop(name, None)
+
     @property
     def pattern(self) -> Structure:
         """Where the normal matrix has entries."""
@@ -153,8 +196,10 @@ class LinearSystem:
 
     def product(self, vectors: Tensor) -> Tensor:
         """``J^T J`` times vectors (N,) or (N, k)."""
-        rows, turned = self._term_matrices
+        (rows, turned), *others = self._term_matrices
         result: Tensor = turned @ (rows @ vectors)
+        for rows, turned in others:
+            result += turned @ (rows @ vectors)
         return result if self.structure.affine is None else result.add_(self.structure.affine.product(vectors))
 
     def preconditioner(self, damping: Tensor) -> Tensor:
@@ -168,4 +213,4 @@ class LinearSystem:
     @cached_property
     def lower_values(self) -> Tensor:
         """Values of the lower triangle of ``J^T J`` in the order of the normal pattern."""
-        return self.structure.normal_pattern.assemble(self.jacobians)
+        return self.structure.normal_pattern.assemble(self.whole_jacobians)

@@ -12,23 +12,30 @@ from ..linear.sparse import scatter_matrix
 from .compiled import CompiledTerm
 from .layout import Layout
 
+Felt = Sequence[Tensor | None]
+
 
 class _Entry(NamedTuple):
-    """Stencil rows of one term in one block: number of the term, first local unknown, number of rows."""
+    """Stencil rows of one term in one block: number of the term, first local unknown, nodes (n, rows)."""
 
     term: int
     first: int
-    rows: int
+    nodes: Tensor
+
+    @property
+    def rows(self) -> int:
+        return self.nodes.shape[1]
 
 
 class _Block(NamedTuple):
-    """A block of variables with all that is summed into it."""
+    """A block of variables with all that is summed into it: by a matrix, or by the nodes of those that are felt."""
 
     nodes: int
     width: int
     start: int
     entries: list[_Entry]
     matrix: Tensor
+    partial: list[_Entry]
 
 
 class NodeSums:
@@ -40,31 +47,38 @@ class NodeSums:
         layout: Blocks of variables.
         terms: Those that are summed.
         like: A tensor of the dtype and device of the blocks.
+        partial: For every term, whether only some of its elements are summed, others every time.
     """
 
-    def __init__(self, layout: Layout, terms: Sequence[CompiledTerm], like: Tensor) -> None:
+    def __init__(
+        self, layout: Layout, terms: Sequence[CompiledTerm], like: Tensor, partial: Sequence[bool] | None = None
+    ) -> None:
         self._like, self._size = like, layout.num_unknowns
         self._blocks: list[_Block] = []
         for name, (count, width) in layout.sizes.items():
-            entries, index = [], []
+            entries: list[_Entry] = []
+            some: list[_Entry] = []
             for number, compiled in enumerate(terms):
                 first = 0
                 for other, nodes in compiled.term.stencil:
-                    rows = nodes.shape[1]
                     if other == name:
-                        entries.append(_Entry(number, first, rows))
-                        index.append(nodes.T.reshape(-1).int())
-                    first += rows * layout.sizes[other][1]
-            if entries:
-                matrix = scatter_matrix(torch.cat(index), count, like.dtype)
-                self._blocks.append(_Block(count, width, layout.offset(name), entries, matrix))
+                        (some if partial and partial[number] else entries).append(_Entry(number, first, nodes))
+                    first += nodes.shape[1] * layout.sizes[other][1]
+            if entries or some:
+                index = [entry.nodes.T.reshape(-1).int() for entry in entries]
+                whole = torch.cat([like.new_zeros(0, dtype=torch.int32), *index])
+                matrix = scatter_matrix(whole, count, like.dtype)
+                self._blocks.append(_Block(count, width, layout.offset(name), entries, matrix, some))
 
-    def vector(self, local: Sequence[Tensor], factors: Sequence[Tensor] | None = None) -> Tensor:
+    def vector(
+        self, local: Sequence[Tensor], factors: Sequence[Tensor] | None = None, felt: Felt | None = None
+    ) -> Tensor:
         """(N,) sums of local vectors.
 
         Args:
             local: For every term ``(K, n)``; or ``(m, K, n)``, whose components are multiplied by factors and summed.
             factors: For every term ``(m, n)`` or ``(m, K, n)``.
+            felt: For every term the numbers of the elements that are given, None for all of them.
         """
         total = self._like.new_zeros(self._size)
         for block in self._blocks:
@@ -80,13 +94,17 @@ class NodeSums:
                     theirs = theirs[:, None] if theirs.ndim == 2 else _rows(theirs, entry, width, a)
                     _contract(mine, theirs, out)
 
-                here[:, a] = self._summed(block, fill, local)
+                here[:, a] = self._summed(block, fill, local, felt)
         return total
 
-    def blocks(self, jacobians: Sequence[Tensor]) -> Iterator[tuple[int, int, int, Tensor]]:
+    def blocks(self, jacobians: Sequence[Tensor], felt: Felt | None = None) -> Iterator[tuple[int, int, int, Tensor]]:
         """Lower triangles of the diagonal blocks of ``J^T J`` for element Jacobians ``(m, K, n)``, entry by entry.
 
         Where an element names a node twice, the mixed products are left out.
+
+        Args:
+            jacobians: Of every term.
+            felt: See :meth:`vector`.
 
         Yields:
             First unknown of a block of variables, row, column, and the values (nodes,) of all its nodes.
@@ -99,9 +117,11 @@ class NodeSums:
                         jacobian = jacobians[entry.term]
                         _contract(_rows(jacobian, entry, width, a), _rows(jacobian, entry, width, b), out)
 
-                    yield block.start, a, b, self._summed(block, fill, jacobians)
+                    yield block.start, a, b, self._summed(block, fill, jacobians, felt)
 
-    def _summed(self, block: _Block, fill: Callable[[_Entry, Tensor], None], local: Sequence[Tensor]) -> Tensor:
+    def _summed(
+        self, block: _Block, fill: Callable[[_Entry, Tensor], None], local: Sequence[Tensor], felt: Felt | None
+    ) -> Tensor:
         values, start = self._like.new_empty(block.matrix.shape[1]), 0
         for entry in block.entries:
             count = local[entry.term].shape[-1]
@@ -109,6 +129,12 @@ class NodeSums:
             fill(entry, out)
             start += out.numel()
         result: Tensor = block.matrix @ values
+        for entry in block.partial:
+            out = self._like.new_empty(entry.rows, local[entry.term].shape[-1])
+            fill(entry, out)
+            chosen = None if felt is None else felt[entry.term]
+            nodes = entry.nodes if chosen is None else entry.nodes[chosen]
+            result.index_add_(0, nodes.T.reshape(-1), out.reshape(-1))
         return result
 
 

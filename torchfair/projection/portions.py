@@ -54,6 +54,11 @@ def portions(count: int, like: Tensor) -> list[slice]:
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
 
+def are_many(count: int) -> bool:
+    """Whether there are so many elements that it pays to look which of them matter."""
+    return count > 2 * _PORTION
+
+
 def by_portions(function: Callable[..., Tensor], arguments: Sequence[Tensor]) -> Tensor:
     """``function(*arguments)``, whose rows do not depend on each other.
 

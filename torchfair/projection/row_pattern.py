@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import torch
 from torch import Tensor
 
 from ..linear.sparse import csr_matrix, group
 from .affine import AffinePart
-from .compiled import CompiledTerm
 
 
 class RowPattern:
     """Rows of ``J``: component by component, element by element, term by term; then the linear terms.
 
     Args:
-        terms: The terms that are not linear.
+        unknowns: Of the elements of each term that is not linear, (K, n).
         outputs: Number of components of each.
         affine: The linear terms.
         like: A tensor of the dtype and device of the blocks, with one entry for each unknown.
     """
 
     def __init__(
-        self, terms: Sequence[CompiledTerm], outputs: Sequence[int], affine: AffinePart | None, like: Tensor
+        self, unknowns: Iterable[Tensor], outputs: Sequence[int], affine: AffinePart | None, like: Tensor
     ) -> None:
         lengths, columns = [like.new_zeros(1, dtype=torch.int64)], [like.new_zeros(0, dtype=torch.int32)]
-        for term, m in zip(terms, outputs, strict=True):
-            k, n = term.unknowns.shape
+        for own, m in zip(unknowns, outputs, strict=True):
+            k, n = own.shape
             lengths.append(torch.full((m * n,), k, device=like.device))
-            columns.append(term.unknowns.to(torch.int32).T.expand(m, -1, -1).reshape(-1))
+            columns.append(own.to(torch.int32).T.expand(m, -1, -1).reshape(-1))
         self._constant = like.new_zeros(0)
         if affine is not None:
             lengths.append(torch.from_numpy(affine.jacobian.indptr).diff().to(like.device))

@@ -10,7 +10,7 @@ from ..settings.projection_settings import ProjectionSettings
 from .evaluate import culprit, residual_table
 from .layout import State
 from .problem import Problem
-from .result import IterationRecord, ProjectionResult, Status, message_of
+from .result import IterationRecord, ProjectionResult, Status, TermResidual, message_of
 from .state import ProjectionState
 from .steps import finished, init, record_of, step
 from .stopwatch import Stopwatch
@@ -43,7 +43,8 @@ class Run:
         self._watch = Stopwatch()
         self._problem, self._callback, self._observe, self._guard = problem, callback, observe, guard
         self._blocks, self._settings = blocks, settings
-        self._states: list[ProjectionState] = []  # the start and the best one
+        self._best: ProjectionState | None = None
+        self._initial: list[TermResidual] = []
         self._quantities: dict[str, float] = {}
         self._history: list[IterationRecord] = []
 
@@ -57,21 +58,24 @@ class Run:
                 status = self._loop(interrupts)
             except KeyboardInterrupt:
                 status = Status.INTERRUPTED
-            if not self._states:
+            if self._best is None:
                 return unbegun(self._problem, self._blocks, self._watch)[0]
-            return interrupts.insist(self._result, status)
+            return interrupts.insist(self._result, self._best, status)
 
     def _loop(self, interrupts: Interrupts) -> Status:
-        state = interrupts.interruptible(init, self._problem, self._blocks, self._settings)
-        self._states = [state, state]
+        problem = self._problem
+        state = interrupts.interruptible(init, problem, self._blocks, self._settings)
+        # The table and not the state: that would keep the Jacobians of the start.
+        self._initial = interrupts.insist(residual_table, problem.structure, problem.terms, state.evaluation)
+        self._best = state
         if self._stops(interrupts, record_of(state), state):
             return Status.CALLBACK
         limit = state.settings.time_limit
         while (status := finished(state)) is None:
             if limit is not None and self._watch.elapsed > limit:
                 return Status.TIME_LIMIT
-            state, record = interrupts.interruptible(step, self._problem, state, self._guard)
-            self._states[1] = state
+            state, record = interrupts.interruptible(step, problem, state, self._guard)
+            self._best = state
             if finished(state) is not Status.SINGULAR and self._stops(interrupts, record, state):
                 return Status.CALLBACK
         return status
@@ -88,8 +92,8 @@ class Run:
         seen = replace(record, state=state)
         return self._callback is not None and bool(interrupts.interruptible(self._callback, seen))
 
-    def _result(self, status: Status) -> ProjectionResult:
-        problem, (start, best) = self._problem, self._states
+    def _result(self, best: ProjectionState, status: Status) -> ProjectionResult:
+        problem = self._problem
         detail = culprit(problem.structure, best.blocks) if status is Status.SINGULAR else ""
         timings = {part: sum(r.timings.get(part, 0.0) for r in self._history) for part in _PARTS}
         return ProjectionResult(
@@ -97,7 +101,7 @@ class Run:
             status=status,
             message=message_of(status, self._history, detail),
             residuals=residual_table(problem.structure, problem.terms, best.evaluation),
-            initial_residuals=residual_table(problem.structure, problem.terms, start.evaluation),
+            initial_residuals=self._initial,
             history=self._history,
             solver=problem.solver.name,
             timings={**timings, "total": self._watch.elapsed},

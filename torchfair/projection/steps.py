@@ -160,21 +160,25 @@ def step(
     trials = Trials(problem, state, proposal, guard, watch)
     try_candidates(trials, proposal, state)
     best = trials.best()
+    outcomes = list(map(Outcome, dampings, trials.gains, *trials.sizes(), trials.taken, trials.halvings))
     linearised, standings = state.linearised, [course.standing for course in state.courses]
+    lost, heeded, iterations = proposal.lost, proposal.heeded, proposal.iterations
     if best is not None:
+        proposal.system.release()
+        state.linearised.system.release()
+        del trials, proposal  # with the factor, before the next Jacobians are made
         with watch.part("linearise"):
             linearised, standings = _linearise(problem, best, settings, state.linearised.stiffness)
-    outcomes = map(Outcome, dampings, trials.gains, *trials.sizes(), trials.taken, trials.halvings)
     courses = [
-        _after(course, outcome, standing, settings, inexact=problem.solver.inexact, lost=number in proposal.lost)
+        _after(course, outcome, standing, settings, inexact=problem.solver.inexact, lost=number in lost)
         for number, (course, outcome, standing) in enumerate(zip(state.courses, outcomes, standings, strict=True))
     ]
     evaluation = best or state.evaluation
     after = replace(state, evaluation=evaluation, linearised=linearised, courses=tuple(courses))
-    after = replace(after, heeded=proposal.heeded)
+    after = replace(after, heeded=heeded)
     with watch.part("solve"):
         after = _judged(problem, after)
-    return after, record_of(after, inner_iterations=proposal.iterations, timings=watch.parts)
+    return after, record_of(after, inner_iterations=iterations, timings=watch.parts)
 
 
 def finished(state: ProjectionState) -> Status | None:

@@ -17,10 +17,10 @@ from .block_diagonal import BlockDiagonal
 from .compiled import CompiledTerm
 from .layout import Layout, State
 from .linear_system import LinearSystem
-from .loss import apply_root
-from .node_sums import NodeSums
+from .loss import apply_root, is_one_sided
+from .node_sums import Felt, NodeSums
 from .normal_pattern import NormalPattern
-from .portions import Arguments, portions
+from .portions import Arguments, are_many, portions
 from .repeated_pattern import RepeatedPattern
 from .replicate import first_members
 from .row_pattern import RowPattern
@@ -53,6 +53,9 @@ class Structure:
         compiled: Those of them that are not linear.
         affine: The linear ones, None if there are none.
         free: (N,) unknowns that may move.
+        like: (N,) zeros, of the dtype and on the device of the blocks.
+        partial: For each term of ``compiled``, whether linear systems hold those of its elements only that are felt
+            (:class:`LinearSystem`): silent terms and inequalities, where there are many elements.
 
     Args:
         single: In a batch, the structure of one member.
@@ -70,12 +73,14 @@ class Structure:
         self._linear: list[CompiledTerm] = []
         self.affine: AffinePart | None = None
         self._take([CompiledTerm(term, layout) for term in self._checked(terms)], dtype)
-        self._like = torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device)
+        self.like = torch.zeros(layout.num_unknowns, dtype=dtype, device=free.device)
         self._mask()
 
     def _mask(self) -> None:
         """Where the Jacobians of elements have columns of fixed unknowns."""
-        self._free = [None if bool(self.free.all()) else self.free[c.unknowns] for c in self.compiled]
+        every = bool(self.free.all())
+        self._every, pairs = every, zip(self.compiled, self.partial, strict=True)
+        self._free = [None if every or partial else self.free[c.unknowns] for c, partial in pairs]
 
     def _checked(self, terms: Sequence[ElementTerm]) -> list[ElementTerm]:
         for term in terms:
@@ -85,11 +90,16 @@ class Structure:
     def _take(self, compiled: list[CompiledTerm], dtype: torch.dtype) -> None:
         self.terms = [c.term for c in compiled]
         self.compiled = [c for c in compiled if not c.term.linear]
+        self.partial = [self._is_partial(c.term) for c in self.compiled]
         linear = [c for c in compiled if c.term.linear]
         if [id(c.term) for c in linear] == [id(c.term) for c in self._linear]:
             return  # the same system
         self._linear = linear
         self.affine = AffinePart(self._linear, self.layout, self.free, dtype) if self._linear else None
+
+    def _is_partial(self, term: ElementTerm) -> bool:
+        chosen = (term.silent or is_one_sided(term.loss)) and are_many(term.num_elements)
+        return chosen and self.layout.members == 1 and self.free.is_cpu
 
     def with_terms(self, terms: Sequence[ElementTerm]) -> Structure:
         """The structure of terms on the same stencils with other data, weights and losses; index maps are kept.
@@ -105,7 +115,10 @@ class Structure:
         for stale in ("normal_pattern", "block_diagonal", "_row_patterns"):
             result.__dict__.pop(stale, None)
         result._single = None
-        result._take(compiled, self._like.dtype)
+        result._take(compiled, self.like.dtype)
+        if result.partial != self.partial:
+            result.__dict__.pop("_node_sums", None)
+            result._mask()
         pattern = self.__dict__.get("normal_pattern")
         if isinstance(pattern, NormalPattern) and pattern.fits(result.affine):
             result.__dict__["normal_pattern"] = pattern.with_constant(result.affine)
@@ -146,20 +159,23 @@ class Structure:
 
     @cached_property
     def _node_sums(self) -> NodeSums:
-        return NodeSums(self.layout, self.compiled, self._like)
+        return NodeSums(self.layout, self.compiled, self.like, self.partial)
 
-    def scatter(self, local: Sequence[Tensor], factors: Sequence[Tensor] | None = None) -> Tensor:
+    def scatter(
+        self, local: Sequence[Tensor], factors: Sequence[Tensor] | None = None, felt: Felt | None = None
+    ) -> Tensor:
         """(N,) sum of local vectors ``(K, n)`` of the terms that are not linear.
 
-        With ``factors`` of the terms, ``(m, n)`` or ``(m, K, n)``: of ``(m, K, n)`` times these, components added.
+        With ``factors`` of the terms, ``(m, n)`` or ``(m, K, n)``: of ``(m, K, n)`` times these, components added. With
+        ``felt``, of the elements that are felt (:class:`LinearSystem`).
         """
-        return self._node_sums.vector(local, factors)
+        return self._node_sums.vector(local, factors, felt)
 
     def member_sums(self, local: Sequence[Tensor]) -> Tensor:
         """(members,) sums of local values ``(m, n)`` of the terms that are not linear."""
         members = self.layout.members
         parts = [part.view(part.shape[0], members, -1).sum((0, 2)) for part in local]
-        return torch.stack([self._like.new_zeros(members), *parts]).sum(0)
+        return torch.stack([self.like.new_zeros(members), *parts]).sum(0)
 
     @cached_property
     def normal_pattern(self) -> NormalPattern | RepeatedPattern:
@@ -167,19 +183,23 @@ class Structure:
         single = None if self._single is None else self._single.normal_pattern
         if isinstance(single, NormalPattern):
             return RepeatedPattern(single, self.layout)
-        return NormalPattern(self.layout, self.compiled, self.affine, self._like)
+        return NormalPattern(self.layout, self.compiled, self.affine, self.like)
 
     @cached_property
     def block_diagonal(self) -> BlockDiagonal:
         """Diagonal blocks of the normal matrix and the map into them."""
-        return BlockDiagonal(self.layout, self._node_sums, self.affine, self._like)
+        return BlockDiagonal(self.layout, self._node_sums, self.affine, self.like)
 
     def row_pattern(self, outputs: tuple[int, ...], *, whole: bool = True) -> RowPattern:
-        """Sparsity of the Jacobian, for the numbers of components of the residuals; with the linear terms if whole."""
+        """Sparsity of the Jacobian, for the numbers of components of the residuals.
+
+        If whole, with the linear terms and with all elements; else without both and without terms that are partial.
+        """
         known: dict[bool, tuple[tuple[int, ...], RowPattern]] = self.__dict__.setdefault("_row_patterns", {})
         if whole not in known or known[whole][0] != outputs:
             affine = self.affine if whole else None
-            known[whole] = outputs, RowPattern(self.compiled, outputs, affine, self._like)
+            chosen = [c for c, partial in zip(self.compiled, self.partial, strict=True) if whole or not partial]
+            known[whole] = outputs, RowPattern((c.unknowns for c in chosen), outputs, affine, self.like)
         return known[whole][1]
 
     def evaluate(self, state: State) -> Evaluation:
@@ -207,12 +227,12 @@ class Structure:
         affine: Tensor | None,
         chosen: list[int] | None = None,
     ) -> Evaluation:
-        arguments, values, parts = [], [], [self._like.new_zeros(count)]
+        arguments, values, parts = [], [], [self.like.new_zeros(count)]
         for term in terms:
             arguments.append(term.arguments_at(state))
             values.append(term.values(arguments[-1]))
             contributions = term.contributions(arguments[-1], values[-1])
-            parts.append(contributions.view(count, -1).sum(1).to(self._like))
+            parts.append(contributions.view(count, -1).sum(1).to(self.like))
         if self.affine is not None and affine is not None:
             own = 0.5 * self.affine.member_sums(affine.square(), self.layout.members)
             parts.append(own if chosen is None else own[chosen])
@@ -225,26 +245,44 @@ class Structure:
         bad = []
         for compiled, arguments, values in zip(self.compiled, at.arguments, at.values, strict=True):
             infinite = ~torch.isfinite(compiled.term.contributions(arguments, values))
-            bad.append(infinite.to(self._like).expand_as(compiled.unknowns))
+            bad.append(infinite.to(self.like).expand(sum(compiled.widths), -1))
         return self.scatter(bad) > 0.0
 
     def linearise(self, state: State | Evaluation) -> LinearSystem:
         """Residuals and Jacobians of all terms at a state, scaled by the square roots of their weights."""
         at = state if isinstance(state, Evaluation) else self.evaluate(state)
-        jacobians, residuals, roots = [], [], []
-        for compiled, free, arguments, values in zip(self.compiled, self._free, at.arguments, at.values, strict=True):
+        jacobians, residuals, roots, felt = [], [], [], []
+        for number, (compiled, arguments, values) in enumerate(
+            zip(self.compiled, at.arguments, at.values, strict=True)
+        ):
+            chosen = None
+            if self.partial[number] and compiled.term.silent:
+                chosen = torch.nonzero((values != 0.0).any(1)).squeeze(1)
+            felt.append(chosen)
             roots.append(compiled.term.roots(values))
             residuals.append(apply_root(roots[-1], values).T)
-            jacobian = _scaled(arguments, roots[-1])
-            jacobians.append(jacobian if free is None else jacobian.mul_(free))
-        return LinearSystem(self, jacobians, residuals, roots, at.affine)
+            jacobians.append(self._masked(number, _scaled(arguments, roots[-1], chosen), chosen))
+        return LinearSystem(self, jacobians, residuals, roots, at.affine, felt)
+
+    def _masked(self, number: int, jacobian: Tensor, chosen: Tensor | None) -> Tensor:
+        """The Jacobians of a term with zero columns at fixed unknowns."""
+        if self._every:
+            return jacobian
+        free = self._free[number]
+        if free is None:
+            unknowns = self.compiled[number].unknowns_of(slice(None) if chosen is None else chosen)
+            return jacobian.mul_(self.free[unknowns])
+        return jacobian.mul_(free)
 
 
-def _scaled(arguments: Arguments, root: Tensor) -> Tensor:
-    """Jacobians of a term times their roots, as (m, K, n)."""
+def _scaled(arguments: Arguments, root: Tensor, chosen: Tensor | None) -> Tensor:
+    """Jacobians of a term, of all its elements or of some, times their roots, as (m, K, n)."""
+    if chosen is not None:
+        root = root[chosen]
     result: Tensor | None = None
     for elements in portions(root.shape[0], root):
-        jacobians, own = arguments.term.jacobians(arguments.part(elements)), root[elements]
+        part = arguments.part(elements if chosen is None else chosen[elements])
+        jacobians, own = arguments.term.jacobians(part), root[elements]
         weighted = torch.bmm(own, jacobians.contiguous()) if own.ndim == 3 else jacobians
         local = weighted.permute(1, 2, 0)
         if result is None:

@@ -58,6 +58,8 @@ class ElementTerm:
             ``"jacfwd"`` by ``torch.func`` under ``vmap``. They agree up to rounding. By default the fastest: the closed
             form if there is one; sums; forward mode where an element has more components than unknowns.
         linear: The residual is affine in the state and has no refresh: differentiated only once.
+        silent: The derivative is zero wherever the residual is exactly zero, as that of a barrier far from its bound.
+            Where there are many elements, those take no part in linear systems, and their derivatives are not computed.
         batched: :attr:`residual`, :attr:`merit` and :attr:`jacobian` take all n elements at once, ``(n, k, d)`` and
             data ``(n, ...)``, and return results with n rows: faster where closed forms are written for it. They work
             for any n; rows must not depend on each other.
@@ -75,6 +77,7 @@ class ElementTerm:
     jacobian: Residual | None = None
     derivatives: Way | None = None
     linear: bool = False
+    silent: bool = False
     batched: bool = False
 
     @property

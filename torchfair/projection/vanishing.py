@@ -27,12 +27,13 @@ def vanishing(system: LinearSystem, state: State, tolerance: float) -> Tensor:
     unknowns = [sizes[name].repeat_interleave(n * d // count) for name, (n, d) in layout.sizes.items()]
     squares = torch.cat(unknowns).nan_to_num(nan=0.0)
     answer = torch.ones(count, dtype=torch.bool, device=structure.device)
-    parts = zip(structure.compiled, system.residuals, system.jacobians, system.roots, strict=True)
-    for compiled, residuals, jacobians, root in parts:
+    parts = zip(structure.compiled, system.of_felt(system.residuals), system.jacobians, system.roots, strict=True)
+    for number, (compiled, residuals, jacobians, root) in enumerate(parts):
+        elements = system.elements(number)
         if root.ndim == 1:
-            inverse = torch.where(root > 0.0, 1.0 / root, 0.0)
+            inverse = torch.where(root > 0.0, 1.0 / root, 0.0)[elements]
             residuals, jacobians = residuals * inverse, jacobians * inverse
-        changes = (jacobians.square() * squares[compiled.unknowns]).sum(1)
+        changes = (jacobians.square() * squares[compiled.unknowns_of(elements)]).sum(1)
         answer &= _are_small(residuals.reshape(-1, count, residuals.shape[1] // count), changes, tolerance)
     if structure.affine is not None and system.affine_residual is not None:
         for residuals, changes in structure.affine.by_term(system.affine_residual, squares):

@@ -32,6 +32,7 @@ def growth_terms(topology: Topology, most: Tensor, *, weight: float) -> list[Ele
             data=(most[numbers],),
             weight=weight,
             jacobian=_slopes,
+            silent=True,
             batched=True,
         )
         for numbers, corners in topology.faces_by_size.values()

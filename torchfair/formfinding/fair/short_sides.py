@@ -56,6 +56,7 @@ class ShortSides(NamedTuple):
                 data=(smallest * self.own,),
                 weight=weight,
                 jacobian=_slopes,
+                silent=True,
                 batched=True,
             )
         ]
