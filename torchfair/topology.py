@@ -217,7 +217,9 @@ class Topology(MeshTables):
         return moved
 
     def to(self, device: torch.device | str) -> Topology:
-        """The same topology with its tensors on ``device``."""
+        """The same topology with its tensors on ``device``; itself where they are there."""
+        if self.device == torch.device(device):
+            return self
         return self.map_tensors(lambda tensor: tensor.to(device))
 
     def cpu(self) -> Topology:

@@ -35,21 +35,26 @@ class PieceTracker:
         if points.shape != self._previous.shape:
             self._reset(points)
             return self._last.copy()
-        moved = _lengths(points - self._anchors)
-        bound = np.sqrt(self._shape.squared_distances(points, self._last)) + moved
+        for first in range(0, points.shape[1], BLOCK):
+            self._follow(slice(first, first + BLOCK), points)
+        self._previous = points.copy()
+        return self._last.copy()
+
+    def _follow(self, block: slice, points: Floats) -> None:
+        """Finds the nearest pieces of some of all the points (d, N)."""
+        here, last = points[:, block], self._last[block]
+        bound = np.sqrt(self._shape.squared_distances(here, last)) + _lengths(here - self._anchors[:, block])
         bound += margin(self._shape, bound)
-        known = bound < self._radius
-        row, column = np.nonzero(self._distances <= np.where(known, bound, -1.0)[:, None])
+        known = bound < self._radius[block]
+        row, column = np.nonzero(self._distances[block] <= np.where(known, bound, -1.0)[:, None])
         if row.size:
-            piece = self._candidates[row, column]
-            self._last[known] = lowest_piece(row, piece, measure(self._shape, points, row, piece))
-        lost = np.flatnonzero(~known)
+            piece = self._candidates[block][row, column]
+            last[known] = lowest_piece(row, piece, measure(self._shape, here, row, piece))  # a view
+        lost = block.start + np.flatnonzero(~known)
         if lost.size:
             skin = self._skin[self._last[lost]]
             step = _lengths(points[:, lost] - self._previous[:, lost])
             self._search(lost, points, np.where(_SERVES * step < skin, skin, 0.0))
-        self._previous = points.copy()
-        return self._last.copy()
 
     def _reset(self, points: Floats) -> None:
         count = points.shape[1]

@@ -15,7 +15,7 @@ from ._closest_boxes import Floats, Ints
 from ._closest_cut import cut_faces
 from ._closest_points import to_columns
 from ._closest_query import Kind, ask
-from ._closest_search import nearest_pieces
+from ._closest_search import BLOCK, nearest_pieces
 from ._closest_tracker import PieceTracker
 from ._closest_triangles import Triangles, dot
 from .normals import face_normals, unit_normal, vertex_normals
@@ -141,6 +141,11 @@ class ReferenceSurface:
         return ClosestPointTracker(self)
 
     def _describe(self, points: Floats, pieces: Ints) -> Sequence[Floats | Ints]:
+        starts = range(0, max(1, pieces.size), BLOCK)
+        blocks = [self._describe_block(points[:, a : a + BLOCK], pieces[a : a + BLOCK]) for a in starts]
+        return blocks[0] if len(blocks) == 1 else [np.concatenate(parts) for parts in zip(*blocks, strict=True)]
+
+    def _describe_block(self, points: Floats, pieces: Ints) -> Sequence[Floats | Ints]:
         squared, positions, weights = self._triangles.locate(points, pieces)
         flat = self._normals.take(pieces, axis=1)
         smooth = _unit(dot(weights[:, None], self._corner_normals.take(pieces, axis=2)), flat)

@@ -261,7 +261,10 @@ class Structure:
             felt.append(chosen)
             roots.append(compiled.term.roots(values))
             residuals.append(apply_root(roots[-1], values).T)
-            jacobians.append(self._masked(number, _scaled(arguments, roots[-1], chosen), chosen))
+            if chosen is not None and not len(chosen):
+                jacobians.append(values.new_zeros(values.shape[1], sum(compiled.widths), 0))
+            else:
+                jacobians.append(self._masked(number, _scaled(arguments, roots[-1], chosen), chosen))
         return LinearSystem(self, jacobians, residuals, roots, at.affine, felt)
 
     def _masked(self, number: int, jacobian: Tensor, chosen: Tensor | None) -> Tensor:

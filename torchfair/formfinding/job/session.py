@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from ..._interrupts import deferred_interrupts
+from ..._memory import hand_back_free_memory
 from ..._threads import threads_for
 from ...errors import SettingsError
 from ...projection import (
@@ -40,6 +41,7 @@ _MOST_STEPS = 4  # of them that are accepted, more than one only where handles s
 _LARGEST_LAG = 0.01  # mean edge lengths
 _WORTHWHILE = 0.8  # to which the lag has to fall in a step for another one
 _ENDLESS = 10**9
+_LARGE = 50_000  # vertices of a mesh whose freed memory is worth handing back
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one live step
 
 
@@ -277,6 +279,8 @@ class Session(Generic[R]):
                 return
 
     def _run(self, stage: Stage, watch: Stopwatch) -> ProjectionResult:
+        if self.recipe.start.shape[0] >= _LARGE:
+            hand_back_free_memory()
         limit, settings = self.recipe.settings.projection.time_limit, stage.settings
         if limit is not None:
             settings = replace(settings, time_limit=max(0.0, limit - watch.elapsed))
