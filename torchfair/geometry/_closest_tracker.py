@@ -35,13 +35,17 @@ class PieceTracker:
         if points.shape != self._previous.shape:
             self._reset(points)
             return self._last.copy()
-        for first in range(0, points.shape[1], BLOCK):
-            self._follow(slice(first, first + BLOCK), points)
+        blocks = (slice(first, first + BLOCK) for first in range(0, points.shape[1], BLOCK))
+        lost = np.concatenate([np.zeros(0, np.int64), *(self._follow(block, points) for block in blocks)])
+        if lost.size:
+            skin = self._skin[self._last[lost]]
+            step = _lengths(points[:, lost] - self._previous[:, lost])
+            self._search(lost, points, np.where(_SERVES * step < skin, skin, 0.0))
         self._previous = points.copy()
         return self._last.copy()
 
-    def _follow(self, block: slice, points: Floats) -> None:
-        """Finds the nearest pieces of some of all the points (d, N)."""
+    def _follow(self, block: slice, points: Floats) -> Ints:
+        """Finds the nearest pieces of some of all the points (d, N); the numbers of those without candidates."""
         here, last = points[:, block], self._last[block]
         bound = np.sqrt(self._shape.squared_distances(here, last)) + _lengths(here - self._anchors[:, block])
         bound += margin(self._shape, bound)
@@ -50,11 +54,8 @@ class PieceTracker:
         if row.size:
             piece = self._candidates[block][row, column]
             last[known] = lowest_piece(row, piece, measure(self._shape, here, row, piece))  # a view
-        lost = block.start + np.flatnonzero(~known)
-        if lost.size:
-            skin = self._skin[self._last[lost]]
-            step = _lengths(points[:, lost] - self._previous[:, lost])
-            self._search(lost, points, np.where(_SERVES * step < skin, skin, 0.0))
+        lost: Ints = block.start + np.flatnonzero(~known)
+        return lost
 
     def _reset(self, points: Floats) -> None:
         count = points.shape[1]

@@ -22,6 +22,7 @@ from .damping import ConstantDamping, Damping
 from .evaluate import check_linearised, check_start
 from .inequalities import Inequalities
 from .layout import State
+from .portions import are_many
 from .problem import Problem
 from .result import IterationRecord, Status
 from .state import Linearised, ProjectionState
@@ -157,6 +158,8 @@ def step(
         )
         after = replace(state, courses=ended)
         return after, record_of(after, timings=watch.parts)
+    if are_many(problem.layout.num_unknowns):
+        proposal.system.release()  # a correction makes them anew; trials need the memory
     trials = Trials(problem, state, proposal, guard, watch)
     try_candidates(trials, proposal, state)
     best = trials.best()

@@ -242,11 +242,11 @@ class Structure:
 
     def unknowns_of_infinite_elements(self, at: Evaluation) -> Tensor:
         """(N,) bool: unknowns of elements whose share of the merit is not finite."""
-        bad = []
+        bad = torch.zeros_like(self.free)
         for compiled, arguments, values in zip(self.compiled, at.arguments, at.values, strict=True):
-            infinite = ~torch.isfinite(compiled.term.contributions(arguments, values))
-            bad.append(infinite.to(self.like).expand(sum(compiled.widths), -1))
-        return self.scatter(bad) > 0.0
+            infinite = torch.nonzero(~torch.isfinite(compiled.term.contributions(arguments, values))).squeeze(1)
+            bad[compiled.unknowns_of(infinite)] = True
+        return bad
 
     def linearise(self, state: State | Evaluation) -> LinearSystem:
         """Residuals and Jacobians of all terms at a state, scaled by the square roots of their weights."""

@@ -41,7 +41,7 @@ _MOST_STEPS = 4  # of them that are accepted, more than one only where handles s
 _LARGEST_LAG = 0.01  # mean edge lengths
 _WORTHWHILE = 0.8  # to which the lag has to fall in a step for another one
 _ENDLESS = 10**9
-_LARGE = 50_000  # vertices of a mesh whose freed memory is worth handing back
+_LARGE = 100_000  # vertices of a mesh whose freed memory is worth handing back
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one live step
 
 
