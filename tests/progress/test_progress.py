@@ -2,12 +2,17 @@ from __future__ import annotations
 
 import io
 import math
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
-from torchfair.progress import ProgressDisplay, TimeLeft, duration
+from torchfair.progress import ProgressDisplay, TimeLeft, duration, listening, phase
 from torchfair.progress import display as progress
 
 
@@ -200,3 +205,73 @@ def test_time_left_ends_at_zero() -> None:
 )
 def test_durations_in_words(seconds: float, words: str) -> None:
     assert duration(seconds) == words
+
+
+def test_a_phase_is_named_once_it_takes_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "_PATIENCE", 0.05)
+    stream = Flushing()
+    with ProgressDisplay(60, stream=stream):
+        with phase("short"):
+            pass
+        with phase("long"):
+            until(lambda: "long" in stream.flushed)
+            with phase("inner"):
+                until(lambda: "inner" in stream.flushed)
+            until(lambda: stream.flushed.count("long") == 2)
+    assert stream.flushed.splitlines() == ["long ...", "inner ...", "long ..."]
+
+
+def until(holds: Callable[[], bool]) -> None:
+    """Waits, for so long that only a display that never writes fails."""
+    end = time.monotonic() + 20.0
+    while not holds() and time.monotonic() < end:
+        time.sleep(0.01)
+    assert holds()
+
+
+def test_nothing_is_named_after_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "_PATIENCE", 0.05)
+    stream = Flushing()
+    before = threading.active_count()
+    with suppress(KeyboardInterrupt), ProgressDisplay(60, stream=stream), phase("interrupted"):
+        raise KeyboardInterrupt
+    until(lambda: threading.active_count() <= before)
+    time.sleep(0.1)
+    assert stream.getvalue() == ""
+
+
+def test_phases_are_told_to_those_who_listen_inner_ones_first() -> None:
+    told: list[str] = []
+    with phase("unheard"), listening(told.append):
+        with phase("one"), phase("two"):
+            pass
+        with suppress(ValueError), phase("three"):
+            raise ValueError
+    with phase("unheard"):
+        pass
+    assert told == ["one", "two", "one", "unheard", "three", "unheard"]
+
+
+def test_other_threads_have_phases_of_their_own() -> None:
+    told: list[str] = []
+
+    def work() -> None:
+        with phase("elsewhere"):
+            pass
+
+    with listening(told.append):
+        thread = threading.Thread(target=work)
+        thread.start()
+        thread.join()
+    assert not told
+
+
+def test_a_log_is_not_silent_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    stream = Flushing()
+    with ProgressDisplay(60, stream=stream, every=30) as display:
+        for iteration in range(12):
+            now[0] += 4.0
+            display(Step(iteration))
+    assert [line.split()[1] for line in stream.flushed.splitlines()] == ["0/60", "3/60", "6/60", "9/60", "11/60"]

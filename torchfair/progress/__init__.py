@@ -1,7 +1,9 @@
-"""Progress of long work on a terminal or in a log: callbacks for solvers, with the time that is left."""
+"""Progress of long work on a terminal or in a log: callbacks for solvers, phases, the time that is left."""
 
 from .display import ProgressDisplay as ProgressDisplay
 from .display import Record as Record
 from .frames import frame_progress as frame_progress
+from .phases import listening as listening
+from .phases import phase as phase
 from .time_left import TimeLeft as TimeLeft
 from .time_left import duration as duration

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import sys
+import threading
 import time
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, TextIO
 
+from .phases import listening
 from .time_left import TimeLeft, duration
 
 if TYPE_CHECKING:
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 _REFRESH = 0.1  # seconds between repaints of a terminal
 _BAR = 20  # columns
 _PLAIN_LINES = 20  # wanted number of plain lines
+_SILENCE = 10.0  # seconds without a plain line after which the next record is shown
+_PATIENCE = 2.0  # seconds after which a phase is named that has not ended
 _SYMBOLS = {"normal_variation": "E", "angle_variation": "E'", "total_absolute_curvature": "C"}
 
 
@@ -54,9 +58,10 @@ class ProgressDisplay:
     """Shows iteration, merit, energies, damping and time left; a callback to be used as a context manager.
 
     On a terminal one line is redrawn in place, at most ten times a second. Otherwise plain lines are printed and
-    flushed: the first record, every ``every``-th, and the last. The time left is that of
-    :class:`~torchfair.progress.TimeLeft`, an upper estimate. Never asks the solver to stop, nor ends
-    it where the stream is closed.
+    flushed: the first record, every ``every``-th, those ten seconds after the last one shown, and the last. What is
+    done without iterations (:func:`~torchfair.progress.phase`) is named once it takes two seconds. The time left is
+    that of :class:`~torchfair.progress.TimeLeft`, an upper estimate. Never asks the solver to stop, nor ends it where
+    the stream is closed.
 
     Example::
 
@@ -87,6 +92,9 @@ class ProgressDisplay:
         self._last: Record | None = None
         self._shown: Record | None = None
         self._repainted = 0.0
+        self._timer: threading.Timer | None = None
+        self._listening = ExitStack()
+        self._writing = threading.Lock()
 
     def __enter__(self) -> ProgressDisplay:
         if self._console is None and self._stream.isatty():
@@ -100,11 +108,15 @@ class ProgressDisplay:
             self._live.start()
         elif self._console is not None:
             self._stream = self._console.file
+        self._repainted = 0.0 if self._live is not None else time.monotonic()
+        self._listening.enter_context(listening(self._begin))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._listening.close()
+        self._begin("")
         if self._last is not None and self._last is not self._shown:
             self._show(self._last)
         if self._live is not None:
@@ -116,20 +128,35 @@ class ProgressDisplay:
         """Takes note of one iteration."""
         self._time_left.observe(record.iteration, record.elapsed)
         self._last = record
-        due = record.iteration % self._every == 0
+        since = time.monotonic() - self._repainted
+        due = record.iteration % self._every == 0 or since >= _SILENCE
         if self._live is not None:
-            due = time.monotonic() - self._repainted >= _REFRESH
+            due = since >= _REFRESH
         if due:
             self._show(record)
 
     def _show(self, record: Record) -> None:
         self._shown = record
-        with suppress(OSError):  # the terminal is closed: nobody looks, but the work goes on
+        self._write("  ".join(self._words(record)), None if self._live is None else self._renderable(record))
+
+    def _write(self, line: str, drawn: RenderableType | None) -> None:
+        """A plain line, or what is drawn in its place on a terminal."""
+        with self._writing, suppress(OSError):  # the terminal is closed: nobody looks, but the work goes on
             if self._live is None:
-                print("  ".join(self._words(record)), file=self._stream, flush=True)
+                print(line, file=self._stream, flush=True)
             else:
-                self._live.update(self._renderable(record), refresh=True)
-                self._repainted = time.monotonic()
+                self._live.update(drawn or line, refresh=True)
+            self._repainted = time.monotonic()
+
+    def _begin(self, words: str) -> None:
+        """Names a phase in a while, if it has not ended by then; "" for none."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if words:
+            self._timer = threading.Timer(_PATIENCE, self._write, (f"{words} ...", None))
+            self._timer.daemon = True
+            self._timer.start()
 
     def _words(self, record: Record) -> list[str]:
         left = self._time_left.seconds()

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from .._interrupts import Interrupts, deferred_interrupts
 from .._memory import hand_back_free_memory
+from ..progress import phase
 from ..settings.projection_settings import ProjectionSettings
 from .evaluate import culprit, residual_table
 from .layout import State
@@ -66,7 +67,8 @@ class Run:
 
     def _loop(self, interrupts: Interrupts) -> Status:
         problem = self._problem
-        state = interrupts.interruptible(init, problem, self._blocks, self._settings)
+        with phase("evaluating the start"):
+            state = interrupts.interruptible(init, problem, self._blocks, self._settings)
         # The table and not the state: that would keep the Jacobians of the start.
         self._initial = interrupts.insist(residual_table, problem.structure, problem.terms, state.evaluation)
         self._best = state

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from .._threads import threads_for
 from ..errors import SettingsError
+from ..progress import phase
 from ..settings.projection_settings import ProjectionSettings
 from .candidates import try_candidates
 from .certificate import certified
@@ -221,7 +222,8 @@ def _judged(problem: Problem, state: ProjectionState) -> ProjectionState:
         answers = [False] * len(state.courses)
     else:
         problem.prepare()
-        answers = certified(problem, state)
+        with phase("looking whether this is a minimum"):
+            answers = certified(problem, state)
     courses = [
         course.judged(certified=answer, goes_on=chosen == "go on") if course.suspicion else course
         for course, answer in zip(state.courses, answers, strict=True)

@@ -12,6 +12,7 @@ from ... import constraints as c
 from ...constraints.closeness import Feet
 from ...geometry import ReferenceSurface, closest_on, face_centres
 from ...geometry.reference import Reference
+from ...progress import phase
 from ...projection import ElementTerm
 from ...projection.layout import State
 from ...topology import Topology
@@ -65,11 +66,13 @@ class Nearness:
         self._vertices, self._pulls, self._boundary = vertices, pulls, boundary
         self._used = topology.valences > 0
         self.limit, self._input_edge, self._notes = limit, input_edge, notes
-        self.surface = surface_of(reference)
-        self.points = _points_on(self.surface, reference, vertices, topology)
+        with phase("preparing the reference surface"):
+            self.surface = surface_of(reference)
+            self.points = _points_on(self.surface, reference, vertices, topology)
         self.design_mode = False
         self.forget()
-        self.limits = self.allowed = self._limits()
+        with phase("distances from the reference surface"):
+            self.limits = self.allowed = self._limits()
 
     def forget(self) -> None:
         """Makes searches for closest points anew."""

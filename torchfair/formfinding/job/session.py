@@ -14,6 +14,7 @@ from ..._interrupts import deferred_interrupts
 from ..._memory import hand_back_free_memory
 from ..._threads import threads_for
 from ...errors import SettingsError
+from ...progress import phase
 from ...projection import (
     Callback,
     GuidedProjection,
@@ -284,7 +285,9 @@ class Session(Generic[R]):
         limit, settings = self.recipe.settings.projection.time_limit, stage.settings
         if limit is not None:
             settings = replace(settings, time_limit=max(0.0, limit - watch.elapsed))
-        return self._problems.of(stage).solve(
+        with phase("setting up the solver"):
+            problem = self._problems.of(stage)
+        return problem.solve(
             stage.blocks,
             settings=replace(settings, solver="auto"),
             callback=self.callback,

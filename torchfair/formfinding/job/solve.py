@@ -9,7 +9,8 @@ from typing import Any
 from torch import Tensor
 
 from ..._interrupts import Interrupts, deferred_interrupts
-from ...projection import Callback
+from ...progress import phase
+from ...projection import Callback, ProjectionResult
 from ..stopping import interrupted, interrupted_at_the_start
 from .recipe import Recipe
 from .result import JobResult, Level
@@ -35,13 +36,15 @@ def solved(
     notes: list[str] = []
 
     def begun() -> tuple[Session[Any], dict[str, float]]:
-        session = Session(begin(), callback=callback, live=False)
-        return session, session.recipe.before()
+        with phase("preparing the mesh"):
+            session = Session(begin(), callback=callback, live=False)
+        return session, _before(session)
 
     def finer(session: Session[Any]) -> tuple[Session[Any], dict[str, float], bool] | None:
         """The session on the next level, solved; None if it was interrupted before a step was taken."""
-        result = session.refined()
-        before = result.recipe.before()
+        with phase("refining"):
+            result = session.refined()
+        before = _before(result)
         ended = result.solve()
         return None if interrupted_at_the_start(result.runs) else (result, before, ended)
 
@@ -57,7 +60,7 @@ def solved(
                     break
                 session, before, stopped = found
             recipe = session.recipe
-            level = interrupts.insist(recipe.level, session.state, before, list(session.runs), like)
+            level = interrupts.insist(_level, session, before, list(session.runs), like)
             if not stopped:
                 session, level, stopped = _with_other_faces(session, level, interrupts)
                 recipe = session.recipe
@@ -85,12 +88,24 @@ def _with_other_faces(session: Session[Any], level: Level, interrupts: Interrupt
         stopped = ended is not False
         if ended is None:
             runs[-1] = interrupted(runs[-1])
-        other = interrupts.insist(recipe.level, latest.state, level.before, runs, level.vertices)
+        other = interrupts.insist(_level, latest, level.before, runs, level.vertices)
         session, level = (latest, other) if _broken(other) < _broken(level) else (session, replace(level, runs=runs))
     if tried:
         outcome = "left as they were, others keep no more promises" if session.recipe.notes is notes else "replaced"
         session.recipe.notes = [*notes, f"promises were broken; faces made anew {tried} time(s): {outcome}"]
     return session, level, stopped
+
+
+def _before(session: Session[Any]) -> dict[str, float]:
+    with phase("measuring the start"):
+        before: dict[str, float] = session.recipe.before()
+    return before
+
+
+def _level(session: Session[Any], before: dict[str, float], runs: list[ProjectionResult], like: Tensor) -> Level:
+    with phase("checking the result"):
+        level: Level = session.recipe.level(session.state, before, runs, like)
+    return level
 
 
 def _broken(level: Level) -> int:
