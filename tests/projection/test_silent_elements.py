@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import weakref
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -86,10 +85,9 @@ def system_of(terms: list[ElementTerm], state: dict[str, Tensor], *, fix: bool, 
 
 
 @pytest.fixture
-def many(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def many(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every number of elements above four is large."""
     monkeypatch.setattr(portions, "_PORTION", 2)
-    yield
 
 
 @pytest.mark.parametrize("fix", [False, True])
@@ -101,7 +99,8 @@ def test_the_system_is_that_of_all_elements(monkeypatch: pytest.MonkeyPatch, fix
     monkeypatch.setattr(portions, "_PORTION", 2)
     some = system_of(terms, state, fix=fix, heeded=heeded)
     count = len(terms[1].stencil[0][1])
-    assert some.felt[0] is None and 0 < len(some.felt[1]) < count
+    assert some.felt[0] is None
+    assert 0 < len(some.felt[1]) < count
     assert (some.felt[2] is not None) == heeded
     step = torch.sin(torch.arange(1.0, 3.0 * len(state["vertices"]) + 1.0, dtype=DOUBLE))
     damping = torch.full_like(step, 0.3)
@@ -186,7 +185,8 @@ def test_a_bad_derivative_is_named_by_the_number_of_its_element(many: None) -> N
     state, terms = problem(silent=True)
     system = system_of(terms, state, fix=False, heeded=False)
     felt = system.felt[1]
-    assert felt is not None and int(felt[2]) != 2
+    assert felt is not None
+    assert int(felt[2]) != 2
     system.jacobians[1][0, 3, 2] = torch.nan
     with pytest.raises(TorchfairError, match=rf"term 'long'.*elements \[{int(felt[2])}\]"):
         evaluate.check_linearised(system.structure, system)
@@ -208,7 +208,8 @@ def test_barriers_of_the_library_are_silent_where_they_are_zero() -> None:
         values, jacobians = term.linearised(term.arguments({"vertices": moved}))
         loud = (values != 0.0).any(1)
         assert 0 < int(loud.sum()) < len(loud)
-        assert not bool(jacobians[~loud].any()) and bool(jacobians[loud].any())
+        assert not bool(jacobians[~loud].any())
+        assert bool(jacobians[loud].any())
 
 
 def test_a_run_keeps_no_jacobians_of_its_start() -> None:
@@ -225,4 +226,5 @@ def test_a_run_keeps_no_jacobians_of_its_start() -> None:
             alive.append(systems[0]() is not None)
 
     guided_projection(state, terms, settings=ProjectionSettings(max_iterations=4), callback=look)
-    assert alive and not any(alive)
+    assert alive
+    assert not any(alive)
