@@ -52,7 +52,7 @@ class PieceTracker:
         known = bound < self._radius[block]
         row, column = np.nonzero(self._distances[block] <= np.where(known, bound, -1.0)[:, None])
         if row.size:
-            piece = self._candidates[block][row, column]
+            piece = self._candidates[block][row, column].astype(np.int64)
             last[known] = lowest_piece(row, piece, measure(self._shape, here, row, piece))  # a view
         lost: Ints = block.start + np.flatnonzero(~known)
         return lost
@@ -62,7 +62,7 @@ class PieceTracker:
         self._previous = points.copy()
         self._anchors = points.copy()
         self._radius = np.zeros(count)
-        self._candidates = np.zeros((count, _CANDIDATES), np.int64)
+        self._candidates = np.zeros((count, _CANDIDATES), np.int32)
         self._distances = np.full((count, _CANDIDATES), np.inf)
         self._last = self._shape.guess(points)
         self._search(np.arange(count), points, np.zeros(count))

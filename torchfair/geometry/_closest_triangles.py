@@ -59,14 +59,14 @@ class Triangles:
         self._centres = cKDTree(corners.mean(1), balanced_tree=False, compact_nodes=False)
         starts = np.ascontiguousarray(corners.transpose(2, 1, 0))  # axes: coordinate, corner, triangle
         self.tree = BoxTree(starts.min(1), starts.max(1))
-        edges = np.roll(starts, -1, axis=1) - starts
+        edges = _edges(starts)
         squared = dot(edges, edges)
         normals = unit_normals(starts)
         inward = np.stack([np.cross(normals, edges[:, k], axis=0) for k in range(3)], axis=1)
         self.extents: Floats = np.sqrt(squared.max(0))
         self.longest = float(self.extents.max())
         # An edge without length is its start: divided by infinity every point is at place 0.
-        rows = (starts, edges, np.where(squared > TINY, squared, np.inf), inward, normals)
+        rows = (starts, np.where(squared > TINY, squared, np.inf), inward, normals)
         self._table = np.concatenate([row.reshape(-1, corners.shape[0]) for row in rows])
 
     def guess(self, points: Floats) -> Ints:
@@ -92,7 +92,8 @@ class Triangles:
         start = edge * pieces.size + column
         end = (edge + 1) % 3 * pieces.size + column
         along = found.along.take(start)
-        corners, edges = table[:9].reshape(3, -1), table[9:18].reshape(3, -1)
+        corners = table[:9].reshape(3, -1)
+        edges = _edges(table[:9].reshape(3, 3, -1)).reshape(3, -1)
         on_edge = corners.take(start, axis=1) + along * edges.take(start, axis=1)
         on_edge = np.where(along < 1.0, on_edge, corners.take(end, axis=1))  # start + edge may miss the end
         on_edge_weights = np.zeros((3, pieces.size))
@@ -101,25 +102,33 @@ class Triangles:
         # The corner opposite to an edge weighs as much as the triangle between that edge and the foot.
         areas = found.inward[[1, 2, 0]]
         total = np.where(found.inside, areas.sum(0), 1.0)
-        positions = np.where(found.inside, points - found.height * table[30:], on_edge)
+        positions = np.where(found.inside, points - found.height * table[21:], on_edge)
         weights = np.where(found.inside, areas / total, on_edge_weights)
         return found.squared, positions, weights
 
 
 def _nearest(points: Floats, table: Floats) -> Nearest:
-    """Where points (3, M) are nearest to the triangles described by the columns of ``table`` (33, M)."""
-    starts, edges, inwards = (table[a : a + 9].reshape(3, 3, -1) for a in (0, 9, 21))
+    """Where points (3, M) are nearest to the triangles described by the columns of ``table`` (24, M)."""
+    starts, inwards = (table[a : a + 9].reshape(3, 3, -1) for a in (0, 12))
+    edges = _edges(starts)  # not in the table, which is the largest of all
     offset = points[:, None] - starts
     along = dot(offset, edges)
-    along /= table[18:21]  # not times the reciprocal: the end of an edge is at 1 exactly
+    along /= table[9:12]  # not times the reciprocal: the end of an edge is at 1 exactly
     np.clip(along, 0.0, 1.0, out=along)
     inward = dot(offset, inwards)
-    height = dot(offset[:, 0], table[30:])
+    height = dot(offset[:, 0], table[21:])
     offset -= along * edges
     from_edges = dot(offset, offset)
     inside = (inward[0] > 0) & (inward[1] > 0) & (inward[2] > 0)
     squared = np.where(inside, height * height, from_edges.min(0))
     return Nearest(squared, inside, height, inward, along, from_edges)
+
+
+def _edges(starts: Floats) -> Floats:
+    """(3, 3, M) from each corner to the next, for axes coordinate, corner, triangle."""
+    ahead: Floats = starts[:, [1, 2, 0]]
+    ahead -= starts
+    return ahead
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from .._interrupts import Interrupts, deferred_interrupts
-from .._memory import hand_back_free_memory
 from ..progress import phase
 from ..settings.projection_settings import ProjectionSettings
 from .evaluate import culprit, residual_table
@@ -19,7 +18,6 @@ from .stopwatch import Stopwatch
 from .trials import Guard
 from .unbegun import unbegun
 
-_LARGE = 300_000  # unknowns, from which on freed memory is worth handing back after each step
 _PARTS = ("linearise", "solve", "merit")
 
 Callback = Callable[[IterationRecord], object]
@@ -80,8 +78,6 @@ class Run:
                 return Status.TIME_LIMIT
             state, record = interrupts.interruptible(step, problem, state, self._guard)
             self._best = state
-            if problem.layout.num_unknowns >= _LARGE:
-                hand_back_free_memory()
             if finished(state) is not Status.SINGULAR and self._stops(interrupts, record, state):
                 return Status.CALLBACK
         return status
