@@ -46,7 +46,7 @@ def slopes(x: Tensor, least: Tensor) -> Tensor:
 
 
 def high(x: Tensor) -> Tensor:
-    return x[0, 2:3] - 0.1
+    return torch.stack([x[0, 2] - 0.1, x[0, 0] - 2.2])
 
 
 def spring(x: Tensor) -> Tensor:
@@ -63,11 +63,11 @@ def problem(*, silent: bool) -> tuple[dict[str, Tensor], list[ElementTerm]]:
     edges = topology.edges
     lengths = torch.linalg.vector_norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], dim=1)
     least = lengths - torch.linspace(2.0, 0.05, len(edges), dtype=DOUBLE)
-    every = torch.arange(len(vertices))[:, None]
+    every, weights = torch.arange(len(vertices))[:, None], torch.linspace(0.5, 2.0, len(edges), dtype=DOUBLE)
     terms = [
         ElementTerm("equal", nearly_equal, [("vertices", edges[::3])]),
-        ElementTerm("long", long_enough, [("vertices", edges)], (least,), 0.7, jacobian=slopes, batched=True,
-                    silent=silent),
+        ElementTerm("long", long_enough, [("vertices", edges)], (least,), 0.7, weights, jacobian=slopes,
+                    batched=True, silent=silent),
         ElementTerm("high", high, [("vertices", every)], weight=20.0, loss=OneSided()),
         ElementTerm("spring", spring, [("vertices", edges[:6])], weight=3.0, linear=True),
     ]  # fmt: skip
@@ -135,6 +135,8 @@ def test_what_is_felt_is_what_has_residuals(many: None) -> None:
     for number in (1, 2):
         torch.testing.assert_close(system.felt[number], torch.nonzero(loud[number]).squeeze(1))
         assert system.jacobians[number].shape[2] == int(loud[number].sum()) < len(loud[number])
+    partly = (system.residuals[2] > 0.0).sum(0)
+    assert bool((partly == 1).any())
     assert system.whole_jacobians[1].shape[2] == len(loud[1])
 
 
