@@ -13,13 +13,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from .._ranges import ranges
 from ..errors import MeshFileError
-from .obj_attributes import ObjAttributes, face_statements, read_attributes
+from .obj_attributes import ObjAttributes, face_statements, line_words, read_attributes, written_textures
+from .quick_obj import quick_statements
 from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
 from .text import Words, check_text, quote, split_words, to_floats, to_ints
 from .text_rows import face_lines, vertex_lines
@@ -42,6 +44,12 @@ def read_obj(path: Path, data: bytes) -> RawMesh:
     Raises:
         MeshFileError: with the line of the fault.
     """
+    quick = _quick_mesh(path, data)
+    return _careful_mesh(path, data) if quick is None else quick
+
+
+def _careful_mesh(path: Path, data: bytes) -> RawMesh:
+    """The mesh of any file, word by word."""
     text = obj_words(path, data)
     vertex_rows, face_rows = statement_rows(path, text, (b"v",), (b"f", b"fo"))
     points = read_vertices(path, text, vertex_rows)
@@ -49,8 +57,33 @@ def read_obj(path: Path, data: bytes) -> RawMesh:
     corners, sizes = vertex_numbers(path, text, vertex_rows, face_rows, slashes=b"/" in data)
     origin = Origin(path, text.lines[vertex_rows], text.lines[face_rows], first_index=1)
     mesh = assemble(origin, points, corners, sizes)
-    attributes = read_attributes(path, text, first_words(text), (vertex_rows, face_rows), as_written)
+    more = (text.sizes[vertex_rows] > 4).any()
+    behind = tuple(line_words(text, row, 4) for row in vertex_rows.tolist()) if more else ()
+    textures = partial(written_textures, path, text, face_rows, as_written)
+    attributes = read_attributes(path, text, text.lines[face_rows], sizes, textures, behind=behind)
     return mesh._replace(attributes=attributes)
+
+
+def _quick_mesh(path: Path, data: bytes) -> RawMesh | None:
+    """The same mesh of a usual file; None of others, and of those with a fault, which :func:`_careful_mesh` names."""
+    found = quick_statements(data)
+    if found is None:
+        return None
+    try:
+        text = found.in_file(obj_words(path, found.rest))
+        if any(rows.size for rows in statement_rows(path, text, (b"v", b"f", b"fo"))):
+            return None
+        known = np.repeat(np.searchsorted(found.vertex_lines, found.face_lines), found.sizes)
+        corners = _from_zero(found.corners, known)
+        origin = Origin(path, found.vertex_lines, found.face_lines, first_index=1)
+        mesh = assemble(origin, found.points, corners, found.sizes)
+        return mesh._replace(
+            attributes=read_attributes(
+                path, text, found.face_lines, found.sizes, found.corner_textures, normals=found.normals
+            )
+        )
+    except MeshFileError:
+        return None
 
 
 def write_obj(
@@ -133,7 +166,12 @@ def vertex_numbers(
     numbers = to_ints(path, text, positions)
     # a negative number counts back from the last vertex that stands before the statement
     known = np.repeat(np.searchsorted(vertex_rows, rows), sizes)
-    return np.where((numbers < 0) & (known + numbers >= 0), known + numbers, numbers - 1), sizes
+    return _from_zero(numbers, known), sizes
+
+
+def _from_zero(numbers: Ints, known: Ints) -> Ints:
+    """Vertex numbers from zero; of as many ``known`` vertices the last is -1."""
+    return np.where((numbers < 0) & (known + numbers >= 0), known + numbers, numbers - 1)
 
 
 def read_vertices(path: Path, text: Words, rows: Ints) -> Floats:

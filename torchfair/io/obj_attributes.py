@@ -6,9 +6,10 @@ import contextlib
 import itertools
 import os
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -78,59 +79,94 @@ def name(keyword: bytes) -> str:
     return f"{_IN_WORDS[keyword]} ({word})" if keyword in _IN_WORDS else f"statements {word}"
 
 
+class CornerTextures(NamedTuple):
+    """Numbers of texture coordinates as they are written.
+
+    Attributes:
+        given: (n,) the numbers, from 1, or from the last backwards if negative.
+        corners: (n,) the corners that have one, among all of the mesh.
+        lines: (n,) lines of their faces.
+    """
+
+    given: Ints
+    corners: Ints
+    lines: Ints
+
+
 def read_attributes(
-    path: Path, text: Words, keywords: list[bytes], rows: tuple[Ints, Ints], words: list[bytes]
+    path: Path,
+    text: Words,
+    face_lines: Ints,
+    corner_sizes: Ints,
+    textures: Callable[[], CornerTextures],
+    *,
+    behind: tuple[bytes, ...] = (),
+    normals: int = 0,
 ) -> ObjAttributes:
     """The attributes of a file.
 
     Args:
         path: The file.
-        text: Its words.
-        keywords: First word of every line.
-        rows: Lines of the vertices and of the faces.
-        words: Corners as they stand in the file.
+        text: Its words; those of vertices, normals and faces may be left out.
+        face_lines: Lines of the faces.
+        corner_sizes: Corners of each face.
+        textures: What the corners say of texture coordinates; asked for if there are any.
+        behind: Words behind the coordinates of each vertex.
+        normals: How many statements of normals ``text`` leaves out.
+
+    Raises:
+        MeshFileError: if texture coordinates are no numbers, or a corner has some that do not exist.
     """
-    vertex_rows, face_rows = rows
-    counts = Counter(keywords)
+    keywords = [text.words[start] for start in text.starts[:-1].tolist()]
+    counts = Counter(keywords) + Counter({b"vn": normals})
     dropped = {k: counts[k] for k in sorted(counts) if k not in (*KEPT, b"v", b"f", b"fo", b"vt")}
     kept = [row for row, keyword in enumerate(keywords) if keyword in KEPT] if counts.keys() & set(KEPT) else []
-    places = np.searchsorted(face_rows, kept).tolist()
-    texture_rows = (
-        np.flatnonzero(np.array([keyword == b"vt" for keyword in keywords])) if counts[b"vt"] else vertex_rows[:0]
-    )
-    numbers = _corner_textures(path, text, face_rows, texture_rows, words) if texture_rows.size else vertex_rows[:0]
-    more = text.sizes[vertex_rows] > 4
+    places = np.searchsorted(face_lines, text.lines[kept]).tolist()
+    none = np.zeros(0, np.int64)
+    texture_rows = np.flatnonzero(np.array([keyword == b"vt" for keyword in keywords])) if counts[b"vt"] else none
+    numbers = none
+    if texture_rows.size:
+        numbers = _corner_textures(path, text, texture_rows, textures(), int(corner_sizes.sum()))
     return ObjAttributes(
         path.parent,
-        tuple(zip(places, (_line(text, row) for row in kept), strict=True)),
-        tuple(_line(text, row, 4) for row in vertex_rows.tolist()) if more.any() else (),
-        tuple(_line(text, row) for row in texture_rows.tolist()) if (numbers >= 0).any() else (),
-        numbers if (numbers >= 0).any() else vertex_rows[:0],
+        tuple(zip(places, (line_words(text, row) for row in kept), strict=True)),
+        behind,
+        tuple(line_words(text, row) for row in texture_rows.tolist()) if (numbers >= 0).any() else (),
+        numbers if (numbers >= 0).any() else none,
         dropped,
     )
 
 
-def _line(text: Words, row: int, first: int = 0) -> bytes:
+def line_words(text: Words, row: int, first: int = 0) -> bytes:
+    """A line from its word ``first`` on, with one space between words."""
     return b" ".join(text.words[text.starts[row] + first : text.starts[row + 1]])
 
 
-def _corner_textures(path: Path, text: Words, face_rows: Ints, texture_rows: Ints, words: list[bytes]) -> Ints:
-    """(H,) number from zero of the texture coordinates of each corner, -1 without."""
-    to_floats(path, text, ranges(text.starts[texture_rows] + 1, text.sizes[texture_rows] - 1))
+def written_textures(path: Path, text: Words, face_rows: Ints, words: list[bytes]) -> CornerTextures:
+    """Those of corners, whose ``words`` are as they stand in the file.
+
+    Raises:
+        MeshFileError: if one is no whole number.
+    """
     parts = [word.split(b"/")[1] if b"/" in word else b"" for word in words]
     has = np.array([bool(part) for part in parts], np.bool_)
-    sizes = text.sizes[face_rows] - 1
-    owners = np.repeat(face_rows, sizes)[has]
-    given = to_ints(path, Words([part for part in parts if part], np.arange(has.sum() + 1), text.lines[owners]),
-        np.arange(has.sum()))  # fmt: skip
-    known = np.searchsorted(texture_rows, owners)
+    lines = text.lines[np.repeat(face_rows, text.sizes[face_rows] - 1)[has]]
+    some = Words([part for part in parts if part], np.arange(has.sum() + 1), lines)
+    return CornerTextures(to_ints(path, some, np.arange(has.sum())), np.flatnonzero(has), lines)
+
+
+def _corner_textures(path: Path, text: Words, texture_rows: Ints, textures: CornerTextures, count: int) -> Ints:
+    """(H,) number from zero of the texture coordinates of each corner, -1 without."""
+    to_floats(path, text, ranges(text.starts[texture_rows] + 1, text.sizes[texture_rows] - 1))
+    given = textures.given
+    known = np.searchsorted(text.lines[texture_rows], textures.lines)
     numbers = np.where(given < 0, known + given, given - 1)
     wrong = np.flatnonzero((numbers < 0) | (numbers >= len(texture_rows)))
     if wrong.size:
         fault = f"a corner names texture coordinates {given[wrong[0]]}, but there are {len(texture_rows)}"
-        raise MeshFileError(path, fault, int(text.lines[owners[wrong[0]]]))
-    result = np.full(len(words), -1)
-    result[has] = numbers
+        raise MeshFileError(path, fault, int(textures.lines[wrong[0]]))
+    result = np.full(count, -1)
+    result[textures.corners] = numbers
     return result
 
 

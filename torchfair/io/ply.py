@@ -17,6 +17,7 @@ from .._names import first_few
 from ..errors import MeshFileError
 from .ply_header import Element, Header, read_header
 from .ply_rows import Column, read_binary_rows, read_loose_rows, read_text_rows
+from .quick_ply import quick_body
 from .raw_mesh import Ints, Origin, RawMesh, assemble
 from .text import Words, check_text, split_words
 from .text_rows import face_lines, vertex_lines
@@ -126,6 +127,9 @@ def _read_text(
     path: Path, data: bytes, header: Header, wanted: dict[str, list[int]]
 ) -> tuple[dict[str, list[Column]], dict[str, Ints], list[str]]:
     """Columns, and line numbers of the rows, of every element; and a note if there is more."""
+    quick = quick_body(data, header, wanted)
+    if quick is not None:
+        return *quick, []
     check_text(path, data)
     text = split_words(data[header.body_start :], header.num_lines + 1)
     try:

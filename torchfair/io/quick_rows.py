@@ -1,0 +1,160 @@
+"""Rows of numbers in text at the speed of C: the quick way of the readers.
+
+Digits are read by ``numpy.fromstring``, which rounds correctly, as ``float`` does. Whatever is unusual gives None, and
+the careful reader, which knows the line of every fault, reads the file instead: nothing is accepted here that it would
+refuse, and errors are its own.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from .raw_mesh import Floats, Ints
+
+Codes = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.bool_]
+
+PORTION = 1 << 22
+"""Bytes that are looked at together: few enough for the cache and the memory, enough for little overhead."""
+_SPACE, _NEWLINE = 32, 10
+_BLANKS = b" \t\r\n"
+_FLOAT = b"0123456789+-.eE" + _BLANKS
+_INT = b"0123456789+-" + _BLANKS
+_MOST_DIGITS = 18  # more may not fit into 64 bits
+
+
+class Portion(NamedTuple):
+    """Whole lines of a text.
+
+    Attributes:
+        codes: The bytes; the last is the end of a line.
+        begins: First byte of each line.
+        ends: The newline of each line.
+    """
+
+    codes: Codes
+    begins: Ints
+    ends: Ints
+
+    def lines(self, chosen: Mask) -> Portion:
+        """Some of the lines."""
+        if chosen.all():
+            return self
+        sizes = self.ends + 1 - self.begins
+        ends = np.cumsum(sizes[chosen]) - 1
+        begins = np.append(0, ends[:-1] + 1)[: ends.size]
+        return Portion(self.codes[np.repeat(chosen, sizes)], begins, ends)
+
+
+def is_usual(data: bytes) -> bool:
+    """Whether bytes are text in lines that end with a newline, maybe after a carriage return."""
+    return b"\0" not in data and data.count(b"\r") == data.count(b"\r\n")
+
+
+def portions(data: bytes, start: int = 0) -> Iterator[Portion]:
+    """All lines of ``data`` from the byte ``start`` on, some at a time; a last one without an end is given one."""
+    while start < len(data):
+        end = data.find(b"\n", min(start + PORTION, len(data)) - 1) + 1 or len(data)
+        piece = data[start:end]
+        codes = np.frombuffer(piece if piece.endswith(b"\n") else piece + b"\n", np.uint8)
+        ends = np.flatnonzero(codes == _NEWLINE)
+        yield Portion(codes, np.append(0, ends[:-1] + 1), ends)
+        start = end
+
+
+def float_rows(text: Portion) -> tuple[Floats, Ints] | None:
+    """Numbers of a text, and how many stand on each line; None if a word is no plain decimal number."""
+    counted = _word_starts(text)
+    values = _values(text.codes, np.float64, _FLOAT)
+    return None if values is None or values.size != counted[0].size else (values, counted[1])
+
+
+def int_rows(text: Portion) -> tuple[Ints, Ints] | None:
+    """Whole numbers of a text, and how many stand on each line; None if a word is none, or has many digits."""
+    starts, sizes = _word_starts(text)
+    if starts.size and np.diff(starts, append=text.codes.size).max() > _MOST_DIGITS:
+        return None  # blanks between words count, too: such a text is unusual enough
+    values = _values(text.codes, np.int64, _INT)
+    return None if values is None or values.size != starts.size else (values, sizes)
+
+
+def _word_starts(text: Portion) -> tuple[Ints, Ints]:
+    """First byte of each word, and number of words on each line."""
+    blank = text.codes <= _SPACE
+    is_start = ~blank
+    is_start[1:] &= blank[:-1]
+    starts = np.flatnonzero(is_start)
+    rows = text.begins.size
+    if rows and starts.size and starts.size % rows == 0:
+        table = starts.reshape(rows, -1)  # the usual case: as many on every line
+        if (table[:, 0] >= text.begins).all() and (table[:, -1] < text.ends).all():
+            return starts, np.full(rows, table.shape[1])
+    return starts, np.diff(np.searchsorted(starts, text.ends), prepend=0)
+
+
+def _values(codes: Codes, dtype: type, alphabet: bytes) -> npt.NDArray[Any] | None:
+    """The numbers of a text; None if there is anything else in it.
+
+    A word such as ``1-2`` gives two, one such as ``1e`` ends the list: those who call compare how many there are.
+    """
+    data = codes.tobytes()
+    if data.translate(None, alphabet):
+        return None
+    if not data.strip():
+        return np.zeros(0, dtype)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # given where the text ends early
+            values: npt.NDArray[Any] = np.fromstring(data, dtype, sep=" ")
+            return values
+    except ValueError:
+        return None
+
+
+def without_word(text: Portion) -> Portion:
+    """Lines without their first byte, a word of one letter."""
+    codes = text.codes.copy()
+    codes[text.begins] = _SPACE
+    return text._replace(codes=codes)
+
+
+class Parted(NamedTuple):
+    """Words such as 1/2/3 apart.
+
+    Attributes:
+        text: With blanks for slashes.
+        parts: How many numbers each word has.
+        second: Whether the second of them stood behind the first slash.
+        total: How many numbers there are if none is missing, 0 where no word is parted.
+    """
+
+    text: Portion
+    parts: int
+    second: bool
+    total: int
+
+
+def split_at_slashes(text: Portion) -> Parted | None:
+    """Words apart that all have the form ``1``, all ``1/2``, all ``1//3`` or all ``1/2/3``; None otherwise."""
+    slashes = np.flatnonzero(text.codes == ord("/"))
+    if not slashes.size:
+        return Parted(text, 1, False, 0)
+    starts, _ = _word_starts(text)
+    each = slashes.size // max(starts.size, 1)
+    if each not in (1, 2) or slashes.size != each * starts.size:
+        return None
+    table = slashes.reshape(-1, each)
+    if (table[:, 0] < starts).any() or (table[:-1, -1] > starts[1:]).any():
+        return None
+    doubled = int((table[:, -1] - table[:, 0] == 1).sum())
+    if doubled not in (0, len(table)):
+        return None
+    codes = text.codes.copy()
+    codes[slashes] = _SPACE
+    parts = 2 if doubled else each + 1
+    return Parted(text._replace(codes=codes), parts, not doubled, parts * starts.size)
