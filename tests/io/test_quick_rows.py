@@ -62,11 +62,13 @@ def test_usual_files_go_the_quick_way(text: bytes, monkeypatch: pytest.MonkeyPat
 
 UNUSUAL = [
     b"v 1-2 3 4\nv 1 2\n", b"v 1e 2 3\n", b"v 1_0 2 3\n", b"v 0x1 2 3\n", b"v nan 2 3\n", b"v - 2 3\n",
-    b"v 1.2.3 4 5\n", b"v 1 2 3 4\n", b"v 1 2 3 .5 .5 .5\n", b"v\t1 2 3\n", b" v 1 2 3\n", b"f 1/ 2/ 3/ 4/\n", b"f 1/1/ 2/1/ 3/1/\n",
+    b"v 1.2.3 4 5\n", b"v 1 2 3 4\n", b"v 1 2 3 .5 .5 .5\n", b"v\t1 2 3\n", b" v 1 2 3\n",
+    b"f 1/ 2/ 3/ 4/\n", b"f 1/1/ 2/1/ 3/1/\n",
     b"f 1/1/1/1 2 3\n", b"f /1 /2 /3\n", b"f 1 2/1 3\n", b"f 1 2 +3\n", b"f 1 2 3 # x\n", b"f 1 2 0\n", b"f 1 2 9\n",
     b"f 1 2 -9\n", b"f 1 2\n", b"f\n", b"f 1 2 3\\\n4\n", b"f 1 2 99999999999999999999\n", b"f 1 2 3.0\n",
     b"fo 1 2 3\n", b"vertex 1 2 3\n", b"v 1 2 3\rv 1 2 3\n", b"v 1 2 1e999\n", b"\x1av", b"\0", b"f 1/0 2/0 3/0\n",
-    b"vt a\nf 1/1 2/1 3/1\n", b"vt 1\nf 1/2 2/2 3/2\n", b"vt 1\nf 1/1 2/1 3/1\nf 1 2 3\n", b"f 1-2 3\n", b"f - 2 3\n", b"f 1-2/3 2/1 3\n",
+    b"vt a\nf 1/1 2/1 3/1\n", b"vt 1\nf 1/2 2/2 3/2\n", b"vt 1\nf 1/1 2/1 3/1\nf 1 2 3\n",
+    b"f 1-2 3\n", b"f - 2 3\n", b"f 1-2/3 2/1 3\n",
 ]  # fmt: skip
 
 
