@@ -22,6 +22,7 @@ FLOORS = (
     {"_graph"},
     {"_one_mesh", "batches", "boundary", "geometry", "polylines", "repair", "triangulation"},
     {
+        "_embedded_stars",
         "_exact_triangles",
         "conversions",
         "creases",

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
+from ._embedded_stars import embedded_stars
 from ._exact_triangles import meet_exactly
 from ._one_mesh import one_mesh
 from ._ranges import ranges
@@ -34,9 +35,9 @@ def self_intersections(vertices: Tensor, topology: Topology) -> Tensor:
     ``triangulation.triangulate``, and two of them meet if triangles of theirs do; the triangles of one polygon are not
     compared.
 
-    Pairs of bounding boxes come from a sweep. Triangles are told apart, or not, by their projections onto all axes that
+    Pairs of bounding boxes come from a grid. Triangles are told apart, or not, by their projections onto all axes that
     can separate them; where that is a matter of rounding, rational arithmetic decides. So the answer is exact for the
-    coordinates as they are.
+    coordinates as they are. Stars that are seen to run around their vertex once, from somewhere, are settled as such.
 
     Args:
         vertices: (V, 3), any length unit.
@@ -57,17 +58,32 @@ def self_intersections(vertices: Tensor, topology: Topology) -> Tensor:
     points, triangles, owners = places.cpu().numpy(), cut.triangles.cpu().numpy(), cut.faces.cpu().numpy()
     p = points[triangles]
     area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    margin = _SURE * float(np.abs(p - p[:1, :1]).max()) if len(p) else 0.0
+    settled = np.zeros(len(points), bool)
+    if topology.has_fans:
+        settled = embedded_stars(points, triangles, topology.is_boundary_vertex.cpu().numpy(), margin)
     kept = np.flatnonzero(area > 0.0)
     p, triangles, owners = p[kept], triangles[kept], owners[kept]
+    corners = [np.ascontiguousarray(column) for column in triangles.T]
     found = [np.zeros((0, 2), np.int64)]
     for pairs in _near_pairs(p):
         pairs = pairs[owners[pairs[:, 0]] != owners[pairs[:, 1]]]
-        common = (triangles[pairs[:, 0], :, None] == triangles[pairs[:, 1], None, :]).sum((1, 2))
-        apart, touching = pairs[common == 0], pairs[common == 1]
-        margin = _SURE * float(np.abs(p - p[:1, :1]).max())
+        common, vertex = _common_vertices(corners, pairs)
+        apart, touching = pairs[common == 0], pairs[(common == 1) & ~settled[vertex]]
         found += [apart[_meet(p, apart, margin)], touching[_meet_elsewhere(p, triangles, touching, margin)]]
     named = np.sort(owners[np.concatenate(found)], axis=1)
     return torch.from_numpy(np.unique(named, axis=0)).to(vertices.device)
+
+
+def _common_vertices(corners: list[Ints], pairs: Ints) -> tuple[Ints, Ints]:
+    """(n,) how many vertices two triangles have in common; and which, where it is one, else 0."""
+    first, second = ([corner[side] for corner in corners] for side in (pairs[:, 0], pairs[:, 1]))
+    count, vertex = np.zeros(len(pairs), np.int64), np.zeros(len(pairs), np.int64)
+    for own in first:
+        shared = (own == second[0]) | (own == second[1]) | (own == second[2])
+        count += shared
+        vertex += own * shared
+    return count, np.where(count == 1, vertex, 0)
 
 
 def _near_pairs(p: Floats) -> Iterator[Ints]:
@@ -76,10 +92,12 @@ def _near_pairs(p: Floats) -> Iterator[Ints]:
     Every box is entered into the cells of a grid that it meets, cells of about the size of the boxes; a pair belongs to
     the cell in which both boxes begin.
     """
-    low, high = p.min(1), p.max(1)
     if not len(p):
         return
+    a, b, c = (p[:, i] for i in range(3))
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     first_cell, last_cell, shape = _cells(low, high)
+    low, high = np.ascontiguousarray(low.T), np.ascontiguousarray(high.T)
     sizes = last_cell - first_cell + 1
     owner = np.repeat(np.arange(len(p)), sizes.prod(1))
     within = ranges(np.zeros(len(p), np.int64), sizes.prod(1))
@@ -99,7 +117,7 @@ def _near_pairs(p: Floats) -> Iterator[Ints]:
         place, second = np.repeat(here, own), owner[ranges(here + 1, own)]
         first = owner[place]
         for axis in range(3):
-            close = (low[first, axis] <= high[second, axis]) & (low[second, axis] <= high[first, axis])
+            close = (low[axis][first] <= high[axis][second]) & (low[axis][second] <= high[axis][first])
             place, first, second = place[close], first[close], second[close]
         begins = np.ravel_multi_index(tuple(np.maximum(first_cell[first], first_cell[second]).T), shape)
         mine = begins == cell[place]

@@ -13,6 +13,7 @@ from .._interrupts import ended_like_ctrl_c
 from . import denoise, design, diagnose, fair, form, measure, mesh, reflect, subdivide, symmetric
 from .errors import CommandError
 from .exit_codes import EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, EXIT_OK, EXIT_SIGNAL, IN_WORDS
+from .heap import keep_freed_memory
 from .outcomes import outcome_of
 from .parser import CommandParser
 from .several import run_inputs
@@ -43,6 +44,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     parsed: list[argparse.Namespace] = []
     code = guarded(lambda: _parse(argv, parsed), "torchfair")
+    if argv is None and parsed and getattr(parsed[0], "keeps_memory", False):  # the process is for this command alone
+        keep_freed_memory()
     return guarded(lambda: _run(parsed[0]), parsed[0].name) if parsed else code
 
 

@@ -71,7 +71,7 @@ def add_parser(subparsers: Any) -> None:
     add("--no-pictures", action="store_true", help="write no pictures")
     add("--force", action="store_true", help="replace files that exist")
     add_repair(parser)
-    parser.set_defaults(run=run, name=NAME, output_is_folder=True)
+    parser.set_defaults(run=run, name=NAME, output_is_folder=True, keeps_memory=True)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -64,7 +64,7 @@ def add_parser(subparsers: Any) -> None:
     add_tables(parser, "the mesh")
     parser.add_argument("--force", action="store_true", help="replace tables that exist")
     add_repair(parser)
-    parser.set_defaults(run=run, name=NAME, teller=_teller)
+    parser.set_defaults(run=run, name=NAME, teller=_teller, keeps_memory=True)
 
 
 def _teller(arguments: argparse.Namespace) -> Teller:

@@ -57,10 +57,14 @@ def count_meetings(vertices: Tensor, topology: Topology) -> int:
     they are neighbours in an unwelded mesh.
     """
     pairs = self_intersections(vertices, topology)
-    _, places = torch.unique(vertices.detach(), dim=0, return_inverse=True)
-    corners, offsets = places[topology.corners].tolist(), topology.face_offsets.tolist()
-    rings = [[set(corners[offsets[face] : offsets[face + 1]]) for face in pair] for pair in pairs.tolist()]
-    return sum(len(one & other) not in (1, 2) for one, other in rings)
+    points = vertices.detach().cpu().numpy()
+    corners, offsets = topology.corners.cpu().numpy(), topology.face_offsets.cpu().numpy()
+
+    def places(face: int) -> set[tuple[float, ...]]:
+        return set(map(tuple, points[corners[offsets[face] : offsets[face + 1]]].tolist()))
+
+    known = {face: places(face) for face in torch.unique(pairs).tolist()}
+    return sum(len(known[one] & known[other]) not in (1, 2) for one, other in pairs.tolist())
 
 
 def curvature_doubts(measures: Mapping[str, float]) -> list[str]:
