@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -42,6 +43,13 @@ def _terms(degree: int) -> list[tuple[int, int]]:
     return [(order, k) for order in range(degree + 1) for k in range(order + 1)]
 
 
+@functools.cache
+def _products(count: int) -> list[int]:
+    """Number of the product of every two of so many terms among those of twice the degree, row by row."""
+    terms = _terms(count)[:count]
+    return [(a + b) * (a + b + 1) // 2 + j + k for a, j in terms for b, k in terms]
+
+
 def _shares(degree: int) -> list[float]:
     """What each squared coefficient counts in a sum that does not depend on the directions of x and y.
 
@@ -65,14 +73,14 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     ridge = [_RIDGE * 100.0**order * share for (order, _), share in zip(_terms(degree), _shares(degree), strict=True)]
     least = torch.diag(frames.new_tensor(ridge))
     # Matrices of all vertices would take kilobytes for each, so they are made for one group of patches at a time, and
-    # made again where they are needed once more; those of a small mesh are kept.
+    # made again of their entries, of which a sixth differ, where they are needed once more.
     kept: list[_Moments] = []
     fits = []
     for group in patches.groups:
         moments = _moments(vertices, normals, frames, group, degree)
-        if len(patches.groups) == 1:
-            kept.append(moments)
         fits.append(_plain_fit(moments, least, with_covariance=degree <= 2))
+        if degree > 2:
+            kept.append(moments)
     coefficients, spread, variance = (patches.in_order([fit[i] for fit in fits]) for i in range(3))
     scale = patches.in_order([fit.scale for fit in fits]).squeeze(-1)
     if degree <= 2:
@@ -81,8 +89,7 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     fits.clear()
     variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
     believed = []
-    for group in patches.groups:
-        moments = kept[0] if kept else _moments(vertices, normals, frames, group, degree)
+    for group, moments in zip(patches.groups, kept, strict=True):
         own = gather(doubts, group.centres), gather(variance[..., None], group.centres).squeeze(-1)
         believed.append(_believed_fit(moments, least, *own))
     coefficients = patches.in_order([fit[0] for fit in believed])
@@ -101,10 +108,12 @@ class _Fit(NamedTuple):
 
 
 def _plain_fit(moments: _Moments, least: Tensor, *, with_covariance: bool) -> _Fit:
-    inverse = torch.linalg.inv_ex(moments.matrix + least).inverse
+    matrix = moments.matrix
+    inverse = torch.linalg.inv_ex(matrix + least).inverse
     coefficients = (inverse @ moments.right[..., None]).squeeze(-1)
-    variance = _variance(moments, coefficients, inverse)
-    noisy = moments.twice_weighted + least  # noise enters the right side with the weights, so their squares are here
+    twice_weighted = moments.twice_weighted
+    variance = _variance(moments, coefficients, matrix, (inverse * twice_weighted).sum((-2, -1)))
+    noisy = twice_weighted + least  # noise enters the right side with the weights, so their squares are here
     spread = (inverse @ noisy * inverse).sum(-1) / moments.weight[..., None]
     covariance = coefficients[..., :0]
     if with_covariance:
@@ -123,14 +132,29 @@ def _believed_fit(moments: _Moments, least: Tensor, doubts: Tensor, variance: Te
 
 
 class _Moments(NamedTuple):
-    """Weighted means of products over the members: matrix (*batch, n, p, p), right side (*batch, n, p), and more."""
+    """Weighted means over the members (*batch, n, ...) of products of terms, of heights with terms, and more."""
 
-    matrix: Tensor
-    twice_weighted: Tensor  # the same with squared weights
+    terms: Tensor  # of twice the degree
+    twice_weighted_terms: Tensor  # the same with squared weights
     right: Tensor
     square: Tensor  # of the heights (*batch, n)
     weight: Tensor  # sum (*batch, n)
     scale: Tensor
+
+    @property
+    def matrix(self) -> Tensor:
+        """(*batch, n, p, p) of the products of every two terms."""
+        return _of_pairs(self.terms, self.right.shape[-1])
+
+    @property
+    def twice_weighted(self) -> Tensor:
+        """The same with squared weights."""
+        return _of_pairs(self.twice_weighted_terms, self.right.shape[-1])
+
+
+def _of_pairs(terms: Tensor, size: int) -> Tensor:
+    pairs = torch.tensor(_products(size), device=terms.device)
+    return terms.index_select(-1, pairs).unflatten(-1, (size, size))
 
 
 def _moments(vertices: Tensor, normals: Tensor, frames: Tensor, group: PatchGroup, degree: int) -> _Moments:
@@ -145,12 +169,15 @@ def _moments(vertices: Tensor, normals: Tensor, frames: Tensor, group: PatchGrou
     scale = _mean(distance, weights).sqrt()
     local = (apart / scale[..., None]) @ frames.index_select(-3, centres).mT
     x, y, z = local.unbind(-1)
-    rows = torch.stack([*_monomials(x, y, degree), z], dim=-1)
-    weighted = rows * (weights / total)[..., None]
-    products, squares = weighted.mT @ rows, weighted.mT @ (rows * weights[..., None])
+    # Products of two terms are terms again, of which there are a fifth as many as pairs.
+    terms, own = _monomials(x, y, 2 * degree), len(_terms(degree))
+    rows = torch.stack([*terms, *(term * z for term in terms[:own]), z * z], dim=-2)
+    shares = weights / total
+    sums, squared = (rows @ torch.stack([shares, shares * weights], dim=-1)).unbind(-1)
+    count = len(terms)
     return _Moments(
-        products[..., :-1, :-1], squares[..., :-1, :-1], products[..., :-1, -1], products[..., -1, -1],
-        total.squeeze(-1), scale.squeeze(-1),
+        sums[..., :count].clone(), squared[..., :count].clone(), sums[..., count : count + own].clone(),
+        sums[..., -1].clone(), total.squeeze(-1), scale.squeeze(-1),
     )  # fmt: skip
 
 
@@ -169,12 +196,12 @@ def _monomials(x: Tensor, y: Tensor, degree: int) -> list[Tensor]:
     return rows
 
 
-def _variance(moments: _Moments, coefficients: Tensor, inverse: Tensor) -> Tensor:
+def _variance(moments: _Moments, coefficients: Tensor, matrix: Tensor, used: Tensor) -> Tensor:
     """Mean square of what the polynomials leave, (*batch, V), for as many degrees of freedom as there are."""
-    explained = (coefficients * (2.0 * moments.right - (moments.matrix @ coefficients[..., None]).squeeze(-1))).sum(-1)
+    explained = (coefficients * (2.0 * moments.right - (matrix @ coefficients[..., None]).squeeze(-1))).sum(-1)
     left = moments.square - explained
     left = torch.where(left > _ROUNDING * moments.square, left, 0.0) * moments.weight
-    freedom = moments.weight - (inverse * moments.twice_weighted).sum((-2, -1))
+    freedom = moments.weight - used
     return left / freedom.clamp_min(_LEAST_FREEDOM)
 
 
