@@ -6,7 +6,8 @@ import ctypes
 import sys
 from contextlib import suppress
 
-_MMAP_MAX, _TRIM_THRESHOLD = -4, -1  # numbers of parameters in malloc.h of the GNU C library
+_MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # numbers of parameters in malloc.h of the GNU C library
+_LARGEST = 1 << 26  # bytes: larger pieces are given back, or holes that nothing fits into would double the peak
 
 
 def keep_freed_memory() -> bool:
@@ -21,5 +22,5 @@ def keep_freed_memory() -> bool:
         return False
     with suppress(OSError, AttributeError):  # another C library
         mallopt = ctypes.CDLL(None).mallopt
-        return bool(mallopt(_MMAP_MAX, 0)) and bool(mallopt(_TRIM_THRESHOLD, -1))
+        return bool(mallopt(_MMAP_THRESHOLD, _LARGEST)) and bool(mallopt(_TRIM_THRESHOLD, -1))
     return False

@@ -154,7 +154,7 @@ class _Moments(NamedTuple):
 
 def _of_pairs(terms: Tensor, size: int) -> Tensor:
     pairs = torch.tensor(_products(size), device=terms.device)
-    return terms.index_select(-1, pairs).unflatten(-1, (size, size))
+    return terms.index_select(-1, pairs).reshape(*terms.shape[:-1], size, size)
 
 
 def _moments(vertices: Tensor, normals: Tensor, frames: Tensor, group: PatchGroup, degree: int) -> _Moments:

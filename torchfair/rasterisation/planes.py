@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 
@@ -20,11 +22,31 @@ def plane_depths(points: Tensor, triangles: Tensor, chosen: Tensor, places: Tens
     Returns:
         Depths ``(n,)`` and slopes ``(n,)`` >= 0, float64, constant for autograd.
     """
-    corners = points.detach()[triangles[chosen]].to(torch.float64)
-    origin, a, b = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = torch.linalg.cross(a, b)
-    across = normal[:, :2] / torch.where(normal[:, 2:] == 0, 1, -normal[:, 2:])
-    depth = origin[:, 2] + ((places - origin[:, :2]) * across).sum(-1)
-    nearest, farthest = corners[..., 2].amin(1), corners[..., 2].amax(1)
-    slope = torch.minimum(torch.linalg.vector_norm(across, dim=-1), farthest - nearest)
-    return torch.clamp(depth, nearest, farthest), slope
+    return PlaneTable.of(points, triangles[chosen]).at(torch.arange(len(chosen), device=chosen.device), places)
+
+
+class PlaneTable(NamedTuple):
+    """Planes of projected triangles, to be looked at in many places.
+
+    Attributes:
+        rows: (n, 8) a corner, slopes to the right and down, least and largest depth, slope in its direction.
+    """
+
+    rows: Tensor
+
+    @classmethod
+    def of(cls, points: Tensor, triangles: Tensor) -> PlaneTable:
+        """Of triangles (n, 3) of point numbers, with points (V, 3)."""
+        corners = points.detach()[triangles].to(torch.float64)
+        origin, a, b = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        normal = torch.linalg.cross(a, b)
+        across = normal[:, :2] / torch.where(normal[:, 2:] == 0, 1, -normal[:, 2:])
+        nearest, farthest = corners[..., 2].amin(1), corners[..., 2].amax(1)
+        slope = torch.minimum(torch.linalg.vector_norm(across, dim=-1), farthest - nearest)
+        return cls(torch.cat([origin, across, torch.stack([nearest, farthest, slope], dim=1)], dim=1))
+
+    def at(self, chosen: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
+        """Depths and slopes (n,) of the planes ``chosen`` (n,) at ``places`` (n, 2)."""
+        x, y, z, right, down, nearest, farthest, slope = self.rows.index_select(0, chosen).unbind(1)
+        depth = z + ((places[:, 0] - x) * right + (places[:, 1] - y) * down)
+        return torch.clamp(depth, nearest, farthest), slope

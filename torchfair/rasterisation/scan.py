@@ -11,6 +11,7 @@ from torch import Tensor
 from .runs import expand_counts, run_chunks
 
 _TRIANGLES = 1 << 18  # scanned at a time on a CPU: most of a large mesh cover no pixel
+_SLACK = 1e-6  # pixels: far above the rounding of crossings, which may lie outside of their triangle by it
 _CHUNK = 1 << 17  # pixels handed out at a time on a CPU: keeps every temporary inside the cache
 
 
@@ -49,16 +50,20 @@ def _spans(points: Tensor, triangles: Tensor, before: int, width: int, height: i
     """Those of some triangles, of which so many come before."""
     corners = points.detach()[triangles].to(torch.float64)
     corners = torch.where(torch.isfinite(corners).all(-1).all(-1)[:, None, None], corners, 0)
-    top = _first_centre(corners[..., 1].amin(1), height)
-    bottom = _first_centre(corners[..., 1].amax(1), height)
-    triangle, offset = expand_counts((bottom - top).clamp(min=0))
+    (left_end, top), (right_end, bottom) = (
+        (_first_centre(x, width), _first_centre(y, height))
+        for x, y in ((_least(corners, 0) - _SLACK, _least(corners, 1)), (_most(corners, 0) + _SLACK, _most(corners, 1)))
+    )
+    chosen = torch.nonzero((bottom > top) & (right_end > left_end)).squeeze(1)
+    corners, top, bottom = corners[chosen], top[chosen], bottom[chosen]
+    triangle, offset = expand_counts(bottom - top)
     row = top[triangle] + offset
     left, right = _crossings(corners, triangle, row.to(torch.float64) + 0.5)
     start, stop = _first_centre(left, width), _first_centre(right, width)
     filled = stop > start
     triangle, row, start, stop = triangle[filled], row[filled], start[filled], stop[filled]
     depth, step = _depths(corners, triangle, row, start, stop)
-    return Spans(triangle + before, row, start, stop - start, depth, step)
+    return Spans(chosen[triangle] + before, row, start, stop - start, depth, step)
 
 
 def span_chunks(spans: Spans) -> Iterator[tuple[Tensor, Tensor]]:
@@ -69,6 +74,17 @@ def span_chunks(spans: Spans) -> Iterator[tuple[Tensor, Tensor]]:
 def _first_centre(coordinate: Tensor, size: int) -> Tensor:
     """Number of the first pixel whose centre is at or beyond ``coordinate``, within ``0 .. size``."""
     return (coordinate - 0.5).ceil().clamp(0, size).to(torch.int64)
+
+
+def _least(corners: Tensor, axis: int) -> Tensor:
+    """Least coordinate of triangles (T, 3, 3): pairs at once are faster than a minimum over so few."""
+    a, b, c = corners[..., axis].unbind(1)
+    return torch.minimum(torch.minimum(a, b), c)
+
+
+def _most(corners: Tensor, axis: int) -> Tensor:
+    a, b, c = corners[..., axis].unbind(1)
+    return torch.maximum(torch.maximum(a, b), c)
 
 
 def _crossings(corners: Tensor, triangle: Tensor, centre: Tensor) -> tuple[Tensor, Tensor]:
@@ -99,7 +115,7 @@ def _depths(corners: Tensor, triangle: Tensor, row: Tensor, start: Tensor, stop:
     slope_y = torch.where(area != 0, a[:, 0] * b[:, 2] - a[:, 2] * b[:, 0], 0) / safe
     at_row = (origin[:, 2] + (0.5 - origin[:, 1]) * slope_y + (0.5 - origin[:, 0]) * slope_x)[triangle]
     at_row = at_row + row * slope_y[triangle]
-    nearest, farthest = corners[..., 2].amin(1)[triangle], corners[..., 2].amax(1)[triangle]
+    nearest, farthest = _least(corners, 2)[triangle], _most(corners, 2)[triangle]
     across = slope_x[triangle]
     first = torch.clamp(at_row + start * across, nearest, farthest)
     last = torch.clamp(at_row + (stop - 1) * across, nearest, farthest)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 
@@ -11,7 +13,7 @@ from ..cameras.camera import Camera, Size, check_camera, height_and_width
 from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals
 from ..geometry._ops import dot
-from ..rasterisation.planes import plane_depths
+from ..rasterisation.planes import PlaneTable
 from ..rasterisation.rasterise import visible_triangles
 from ..topology import Topology
 from ..triangulation import triangulate
@@ -65,15 +67,15 @@ def edge_visibility(
     sides = dot(normals, camera.view_directions(ends.mean(1))[..., None, :]).sign()  # (views, I, 2)
     same_side = sides.prod(-1) > 0
     views = [
-        (points, visible_triangles(points, triangles, pixels[1], pixels[0]), _extent(points))
+        _View.of(points, triangles, visible_triangles(points, triangles, pixels[1], pixels[0]))
         for points in camera.project(mesh, size)
     ]
     shares = []
     for some in torch.split(ends, max(1, _PORTION // samples)):
         along = torch.lerp(some[:, :1], some[:, 1:], steps[:, None]).reshape(-1, 3)
         seen = [
-            _seen(places, points, triangles, nearest, extent).view(-1, samples).to(mesh.dtype).mean(-1)
-            for places, (points, nearest, extent) in zip(camera.project(along, size), views, strict=True)
+            view.sees(places).view(-1, samples).to(mesh.dtype).mean(-1)
+            for places, view in zip(camera.project(along, size), views, strict=True)
         ]
         shares.append(torch.stack(seen))
     return (same_side * torch.cat(shares, 1)).to(vertices)
@@ -86,14 +88,37 @@ def _extent(points: Tensor) -> Tensor | float:
     return levels.amax() - levels.amin() if levels.shape[0] else 0.0
 
 
-def _seen(places: Tensor, points: Tensor, triangles: Tensor, nearest: Tensor, extent: Tensor | float) -> Tensor:
-    """Whether projected places (N, 3) lie on or before the surface at their pixel, inside the picture: (N,)."""
-    height, width = nearest.shape
-    row, column = places[:, 1].floor(), places[:, 0].floor()
-    seen = (row >= 0) & (row < height) & (column >= 0) & (column < width)  # false for NaN, behind the eye
-    inside = torch.nonzero(seen).squeeze(1)
-    triangle = nearest[row[inside].long(), column[inside].long()]
-    covered = inside[triangle >= 0]
-    depths, slopes = plane_depths(points, triangles, triangle[triangle >= 0], places[covered, :2])
-    seen[covered] = places[covered, 2] <= depths + _SLACK[0] * slopes + _SLACK[1] * extent
-    return seen
+class _View(NamedTuple):
+    """What hides places in one view.
+
+    Attributes:
+        plane: (H, W) number of the plane of the nearest triangle at every pixel, -1 where there is none.
+        planes: those of all triangles that are the nearest one somewhere.
+        slack: depth by which places may lie behind.
+    """
+
+    plane: Tensor
+    planes: PlaneTable
+    slack: Tensor | float
+
+    @classmethod
+    def of(cls, points: Tensor, triangles: Tensor, nearest: Tensor) -> _View:
+        """With projected points (V, 3) and the nearest triangle (H, W) at every pixel."""
+        covered = nearest >= 0
+        shown, numbers = torch.unique(nearest[covered], return_inverse=True)
+        plane = torch.full_like(nearest, -1).masked_scatter(covered, numbers)
+        return cls(plane, PlaneTable.of(points, triangles[shown]), _SLACK[1] * _extent(points))
+
+    def sees(self, places: Tensor) -> Tensor:
+        """Whether projected places (N, 3) lie on or before the surface at their pixel, inside the picture: (N,)."""
+        height, width = self.plane.shape
+        row, column = places[:, 1].floor(), places[:, 0].floor()
+        seen = (row >= 0) & (row < height) & (column >= 0) & (column < width)  # false for NaN, behind the eye
+        inside = torch.nonzero(seen).squeeze(1)
+        plane = self.plane.view(-1).index_select(0, (row[inside] * width + column[inside]).long())
+        hit = torch.nonzero(plane >= 0).squeeze(1)
+        covered = inside[hit]
+        at = places.index_select(0, covered)
+        depths, slopes = self.planes.at(plane[hit], at[:, :2])
+        seen[covered] = at[:, 2] <= depths + _SLACK[0] * slopes + self.slack
+        return seen

@@ -5,8 +5,6 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..geometry._ops import cross
-
 _FEASIBLE = 1e-9  # rays may leave the cone by this: the sum of all rays is what is judged
 _PARALLEL = 1e-12
 _ROOM = 1 << 16  # rays looked at together: few enough for the cache
@@ -29,7 +27,7 @@ def interior_directions(walls: Tensor) -> tuple[Tensor, Tensor]:
     count = walls.shape[1]
     first, second = torch.triu_indices(count, count, 1, device=walls.device)
     step = max(1, _ROOM // max(1, first.shape[0]))
-    total = torch.cat([_sums_of_rays(part, first, second) for part in walls.split(step)])
+    total = torch.cat([_sums_of_rays(part, first, second) for part in torch.split(walls, step)])
     size = torch.linalg.vector_norm(total, dim=-1)
     found = size > _PARALLEL
     directions = total / torch.where(found, size, 1.0)[:, None]
