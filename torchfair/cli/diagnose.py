@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..progress import phase_progress
 from .arguments import count
 from .chosen_vertices import NUMBERS, ChosenVertices
 from .errors import CommandError
@@ -82,10 +83,13 @@ def run(arguments: argparse.Namespace) -> int:
     mesh = read_input(arguments.input, arguments)
     chosen = ChosenVertices(mesh)
     drawn = _drawn(arguments, chosen)
-    diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
+    with phase_progress("judging stars"):
+        diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
     numbers, worst = diagnosis.counts(), diagnosis.worst_vertices(arguments.worst)
-    advice = layout_advice(mesh.vertices, mesh.topology, diagnosis, names=mesh.names)
-    _explain(worst, mesh)
+    with phase_progress("comparing edges with principal directions"):
+        advice = layout_advice(mesh.vertices, mesh.topology, diagnosis, names=mesh.names)
+    with phase_progress("trying what mends the worst stars"):
+        _explain(worst, mesh)
     report = {
         **numbers,
         "file": arguments.input,
@@ -125,7 +129,8 @@ def write(
     """Writes report and pictures, all or nothing; ``drawn`` vertices have their pyramids drawn."""
     with written_with_report(files, report, arguments):
         if len(files) > 1:
-            _draw(files[1:], mesh, diagnosis, report, drawn, view=view_of(arguments, mesh), force=arguments.force)
+            with phase_progress("drawing pictures"):
+                _draw(files[1:], mesh, diagnosis, report, drawn, view=view_of(arguments, mesh), force=arguments.force)
 
 
 def _draw(

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..progress import phase_progress
 from .arguments import count, positive_count, positive_or_none
 from .errors import CommandError
 from .exit_codes import EXIT_NOT_REACHED, EXIT_OK
@@ -80,7 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
     reference = read_input(arguments.reference, arguments) if arguments.reference else None
     with threads_for(0, mesh.vertices.device):  # pictures of this size are made of very short operations
         view = view_of(arguments, mesh)
-        score = _score(mesh, reference, view, arguments)
+        with phase_progress("comparing reflections"):
+            score = _score(mesh, reference, view, arguments)
         report: dict[str, Any] = dict(score.numbers())
         report |= _compared(score) | {
             "file": arguments.input,
@@ -160,8 +162,9 @@ def write(
             from ..viewing.picture_reflections import picture_reflection_differences, picture_reflections
 
             name = Path(arguments.input).name
-            picture_reflections(pictures[0], score, name, overwrite=arguments.force)
-            picture_reflection_differences(pictures[1], score, name, overwrite=arguments.force)
+            with phase_progress("drawing pictures"):
+                picture_reflections(pictures[0], score, name, overwrite=arguments.force)
+                picture_reflection_differences(pictures[1], score, name, overwrite=arguments.force)
     for film in films:
         from ..progress import frame_progress
         from ..viewing.turntable import turntable

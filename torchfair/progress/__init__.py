@@ -3,6 +3,7 @@
 from .display import ProgressDisplay as ProgressDisplay
 from .display import Record as Record
 from .frames import frame_progress as frame_progress
+from .phase_progress import phase_progress as phase_progress
 from .phases import listening as listening
 from .phases import phase as phase
 from .time_left import TimeLeft as TimeLeft
