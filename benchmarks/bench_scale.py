@@ -13,7 +13,8 @@ energy         E forward and backward: the least of some repetitions
 step           a damped step on E, umbrella fairness and closeness (``torus_problem.py``) by conjugate gradients:
                the mean over some steps from the start, set-up left out; peak memory with set-up
 setup          the index maps of that problem and its first linearisation
-obj, ply       reading the bumpy torus of ``scale_mesh.py`` from a file (ASCII OBJ, binary PLY)
+obj, ply       reading the bumpy torus of ``scale_mesh.py`` from a file (ASCII OBJ, binary PLY), ``plytext`` from
+               ASCII PLY
 measure, ...   the command on that file, imports included: ``measure``, ``diagnose``, ``reflect --no-pictures``,
                ``pictures`` (``reflect``), ``fair`` with at most ``--fair-steps`` steps in each of its runs
 =============  =========================================================================================
@@ -41,7 +42,7 @@ COMMANDS = {
     "pictures": ["reflect"],
     "fair": ["fair", "--no-pictures"],
 }
-TASKS = ("energy", "step", "obj", "ply", *COMMANDS)
+TASKS = ("energy", "step", "obj", "ply", "plytext", *COMMANDS)
 
 
 # What runs in the processes. ----------------------------------------------------------------------------------------
@@ -143,7 +144,7 @@ def write_files(size: int, folder: Path) -> None:
         "import sys, torch, torchfair.io; from scale_mesh import bumpy_torus; "
         "from torchfair import Topology; p, f = bumpy_torus(int(sys.argv[1])); "
         "[torchfair.io.save_mesh(f'{sys.argv[2]}/{sys.argv[1]}.{e}', torch.from_numpy(p), Topology.from_faces(f), "
-        "binary=e == 'ply') for e in ('obj', 'ply')]"
+        "binary=e == 'ply') for e in ('obj', 'ply', 'text.ply')]"
     )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(HERE.parent), str(HERE)])}
     subprocess.run([sys.executable, "-c", code, str(size), str(folder)], env=environment, check=True)
@@ -153,8 +154,8 @@ def work_of(task: str, size: int, folder: Path, repeats: int, fair_steps: int) -
     """Arguments of the process of a task."""
     if task in ("energy", "step"):
         return [task, str(size), str(repeats)]
-    if task in ("obj", "ply"):
-        return ["read", str(folder / f"{size}.{task}")]
+    if task in ("obj", "ply", "plytext"):
+        return ["read", str(folder / f"{size}.{'text.ply' if task == 'plytext' else task}")]
     extra = ["-o", str(folder / "fair.ply"), "--force", "--iterations", str(fair_steps)] if task == "fair" else []
     extra += ["--output", str(folder / "reflect"), "--force"] if task == "pictures" else []
     return ["command", COMMANDS[task][0], str(folder / f"{size}.ply"), *COMMANDS[task][1:], *extra]
