@@ -19,6 +19,7 @@ _POOLING = 2  # times over patches
 _ROUNDING = 1e-12  # of mean squares
 _LEAST_FREEDOM = 0.5
 _NEEDED = 6  # terms up to the second order
+_KEPT = 1 << 25  # numbers, a quarter of a gigabyte
 _MOST_DOUBT = 1e4  # most that the noise of a coefficient may exceed the coefficient expected
 
 
@@ -73,14 +74,15 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     ridge = [_RIDGE * 100.0**order * share for (order, _), share in zip(_terms(degree), _shares(degree), strict=True)]
     least = torch.diag(frames.new_tensor(ridge))
     # Matrices of all vertices would take kilobytes for each, so they are made for one group of patches at a time, and
-    # made again of their entries, of which a sixth differ, where they are needed once more.
-    kept: list[_Moments] = []
-    fits = []
-    for group in patches.groups:
+    # made again where they are needed once more: of what they are made of, as far as that was kept.
+    kept: dict[int, _Moments] = {}
+    fits, room = [], _KEPT
+    for number, group in enumerate(patches.groups):
         moments = _moments(vertices, normals, frames, group, degree)
         fits.append(_plain_fit(moments, least, with_covariance=degree <= 2))
-        if degree > 2:
-            kept.append(moments)
+        room -= sum(part.numel() for part in moments)
+        if degree > 2 and room >= 0:
+            kept[number] = moments
     coefficients, spread, variance = (patches.in_order([fit[i] for fit in fits]) for i in range(3))
     scale = patches.in_order([fit.scale for fit in fits]).squeeze(-1)
     if degree <= 2:
@@ -89,7 +91,8 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     fits.clear()
     variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
     believed = []
-    for group, moments in zip(patches.groups, kept, strict=True):
+    for number, group in enumerate(patches.groups):
+        moments = kept.pop(number, None) or _moments(vertices, normals, frames, group, degree)
         own = gather(doubts, group.centres), gather(variance[..., None], group.centres).squeeze(-1)
         believed.append(_believed_fit(moments, least, *own))
     coefficients = patches.in_order([fit[0] for fit in believed])
