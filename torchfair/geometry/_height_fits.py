@@ -92,7 +92,8 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
     believed = []
     for number, group in enumerate(patches.groups):
-        moments = kept.pop(number, None) or _moments(vertices, normals, frames, group, degree)
+        found = kept.pop(number, None)
+        moments = _moments(vertices, normals, frames, group, degree) if found is None else found
         own = gather(doubts, group.centres), gather(variance[..., None], group.centres).squeeze(-1)
         believed.append(_believed_fit(moments, least, *own))
     coefficients = patches.in_order([fit[0] for fit in believed])
