@@ -3,8 +3,8 @@
 from .display import ProgressDisplay as ProgressDisplay
 from .display import Record as Record
 from .frames import frame_progress as frame_progress
-from .phase_progress import phase_progress as phase_progress
 from .phases import listening as listening
 from .phases import phase as phase
+from .shown_phase import phase_progress as phase_progress
 from .time_left import TimeLeft as TimeLeft
 from .time_left import duration as duration
