@@ -31,7 +31,7 @@ from torchfair import Topology, TorchfairError
 from torchfair.formfinding import planar_quads
 from torchfair.geometry import ReferenceSurface, face_centres, face_normals
 from torchfair.io import load_mesh
-from torchfair.meshing import principal_quads, principal_triangles
+from torchfair.meshing import QuadMesh, TriangleMesh, principal_quads, principal_triangles
 from torchfair.meshing.verification import shape_of
 from torchfair.shapes import EXAMPLES, SURFACES, PrincipalParaboloid, builtin_mesh, icosphere, irregular_triangles
 from torchfair.triangulation import triangulate
@@ -112,11 +112,14 @@ def fault(vertices: torch.Tensor, topology: Topology, surface: Mesh) -> str:
 
 def made(surface: Mesh, kind: str, count: int) -> dict[str, Any]:
     """The mesh of a kind, judged."""
-    make = principal_triangles if kind == "triangles" else principal_quads
-    mesh = make(*surface, count=count)
     row: dict[str, Any] = {}
+    mesh: QuadMesh | TriangleMesh
+    if kind == "triangles":
+        mesh = principal_triangles(*surface, count=count)
+    else:
+        mesh = quads = principal_quads(*surface, count=count)
     if kind == "planar":
-        mesh, job = planar_quads(mesh, surface)
+        mesh, job = planar_quads(quads, surface)
         row = {"planarity": mesh.report["planarity_max"], "missed": [str(of) for of in job.promises if not of.holds]}
     report = mesh.report
     row |= {

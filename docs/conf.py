@@ -18,7 +18,7 @@ import torchfair
 from torchfair import __version__, meshing
 from torchfair.formfinding.fair import planar_quads
 
-planar_quads.QuadMesh = meshing.QuadMesh  # imported there for types only, and without it no type is a link
+vars(planar_quads)["QuadMesh"] = meshing.QuadMesh  # imported there for types only, and without it no type is a link
 
 project = "torchfair"
 author = "The torchfair developers"
