@@ -61,6 +61,7 @@ def test_usual_files_go_the_quick_way(text: bytes, monkeypatch: pytest.MonkeyPat
 
 
 UNUSUAL = [
+    b"f 1/ 2/ 3/ 4/ 2/ 3/\n", b"v 1-2 3 4\nv 1-2 3 4\nv 1-2 3 4\n",
     b"v 1-2 3 4\nv 1 2\n", b"v 1e 2 3\n", b"v 1_0 2 3\n", b"v 0x1 2 3\n", b"v nan 2 3\n", b"v - 2 3\n",
     b"v 1.2.3 4 5\n", b"v 1 2 3 4\n", b"v 1 2 3 .5 .5 .5\n", b"v\t1 2 3\n", b" v 1 2 3\n",
     b"f 1/ 2/ 3/ 4/\n", b"f 1/1/ 2/1/ 3/1/\n",
