@@ -76,7 +76,7 @@ UNUSUAL = [
 @pytest.mark.parametrize("line", UNUSUAL)
 def test_what_is_unusual_is_left_to_the_careful_way(line: bytes) -> None:
     """Errors name what the careful way finds, and nothing that it refuses is read."""
-    for text in (SQUARE + line + b"f 1 2 3\n", SQUARE + b"f 1 2 3\n" + line):
+    for text in (SQUARE + line + b"f 1 2 3\n", SQUARE + b"f 1 2 3\n" + line, b"vt 0 0\n" * 4 + SQUARE + line):
         quick = obj._quick_mesh(PATH, text)
         if quick is None:
             continue
