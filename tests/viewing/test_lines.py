@@ -5,6 +5,8 @@ import torch
 from helpers import DOUBLE, cube
 
 from torchfair.rasterisation.rasterise import visible_triangles
+from torchfair.shapes import icosphere
+from torchfair.viewing import lines
 from torchfair.viewing.camera import fit_camera
 from torchfair.viewing.lines import Surface, visible_lines
 from torchfair.viewing.render import MeshView
@@ -72,3 +74,21 @@ def test_nine_edges_of_a_cube_are_seen(field_of_view: float) -> None:
     assert at_hidden_vertex.sum() == 3
     assert bool((counts[at_hidden_vertex] < 12).all())  # nothing but the ends where they meet the outline
     assert bool((counts[~at_hidden_vertex] > 60).all())
+
+
+@pytest.mark.parametrize("portion", [1, 7])
+def test_lines_are_the_same_however_many_are_looked_at_together(portion: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines of many widths on a shaken sphere, half of them hidden, some off the screen."""
+    mesh, generator = icosphere(2), torch.Generator().manual_seed(0)
+    vertices = mesh.vertices + 0.1 * torch.rand(mesh.vertices.shape, generator=generator, dtype=DOUBLE)
+    towards_eye, up = torch.tensor([[1.0, 0.4, 0.3], [0.0, 0.0, 1.0]], dtype=DOUBLE)
+    camera, size = fit_camera(vertices[vertices[:, 1] > -0.8], towards_eye=towards_eye, up=up, width=120)
+    view = MeshView(vertices, mesh.topology, camera, size)
+    surface = Surface(view.points, view.triangulation.triangles, view.triangle_index)
+    count = mesh.topology.num_edges
+    widths = 5.0 * torch.rand(count, generator=generator)
+    edges = mesh.topology.edges[torch.randperm(count, generator=generator)]
+    at_once = visible_lines(surface, edges, widths)
+    monkeypatch.setattr(lines, "_PORTION", portion)
+    assert torch.equal(visible_lines(surface, edges, widths), at_once)
+    assert 0.3 * count < len(torch.unique(at_once)) < 0.8 * count

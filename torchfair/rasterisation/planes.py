@@ -8,25 +8,10 @@ import torch
 from torch import Tensor
 
 
-def plane_depths(points: Tensor, triangles: Tensor, chosen: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
-    """Depth of the planes of some triangles at places on the screen, and how fast it changes per pixel.
+class PlaneTable(NamedTuple):
+    """Planes of projected triangles, to be looked at in many places; constant for autograd.
 
     Depths stay within those of the corners, slopes within their difference, so that steep planes do not run away.
-
-    Args:
-        points: ``(V, 3)`` as for :func:`~torchfair.rasterisation.rasterise`.
-        triangles: ``(T, 3)`` point numbers.
-        chosen: ``(n,)`` numbers of triangles.
-        places: ``(n, 2)`` x and y in pixels.
-
-    Returns:
-        Depths ``(n,)`` and slopes ``(n,)`` >= 0, float64, constant for autograd.
-    """
-    return PlaneTable.of(points, triangles[chosen]).at(torch.arange(len(chosen), device=chosen.device), places)
-
-
-class PlaneTable(NamedTuple):
-    """Planes of projected triangles, to be looked at in many places.
 
     Attributes:
         rows: (n, 8) a corner, slopes to the right and down, least and largest depth, slope in its direction.

@@ -8,10 +8,12 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from ..rasterisation.planes import plane_depths
+from ..rasterisation.planes import PlaneTable
 from ..rasterisation.scan import Spans, span_chunks, triangle_spans
 
 _LONGEST = 4096  # samples along one edge
+_DEPTH_SHARE = 1e-3  # of all depths, by which lines may lie behind the surface
+_PORTION = 1 << 18  # lines looked at together: a large mesh would need gigabytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,28 +60,74 @@ def visible_lines(surface: Surface, edges: Tensor, widths: Tensor) -> Tensor:
         widths: ``(E,)`` in pixels; lines of width 0 are left out.
     """
     height, width = surface.face_index.shape
-    ends = surface.points.detach()[edges].to(torch.float64)
-    drawn = torch.nonzero((widths > 0) & torch.isfinite(ends).all(-1).all(-1)).squeeze(1)
-    ends, widths = ends[drawn], widths[drawn].to(torch.float64)
-    along = ends[:, 1, :2] - ends[:, 0, :2]
-    lengths = torch.linalg.vector_norm(along, dim=-1)
-    steps = lengths.ceil().clamp(1, _LONGEST).to(torch.int64)
-    seen, first = _seen_samples(surface, ends, steps)
+    depths = surface.points.detach()[:, 2].to(torch.float64)[edges]
+    finite = torch.isfinite(surface.points.detach()).all(-1)[edges].all(-1)
+    drawn = torch.nonzero((widths > 0) & finite).squeeze(1)
+    top = torch.full((height * width,), -1, dtype=torch.int32, device=surface.points.device)
+    if drawn.shape[0]:
+        tolerance = _DEPTH_SHARE * float(depths[drawn].amax() - depths[drawn].amin())
+        hiding = _Hiding.of(surface, tolerance)
+        for some in torch.split(drawn, _PORTION):
+            _put_lines(top, hiding, surface.points.detach()[edges[some]].to(torch.float64), widths[some], some)
+    return top.view(height, width)
+
+
+class _Hiding(NamedTuple):
+    """What hides lines.
+
+    Attributes:
+        planes: Of the triangles that are seen.
+        behind: (height, width) the one at each pixel, -1 for none.
+        tolerance: Depth by which a line may lie behind it.
+    """
+
+    planes: PlaneTable
+    behind: Tensor
+    tolerance: float
+
+    @classmethod
+    def of(cls, surface: Surface, tolerance: float) -> _Hiding:
+        """What a surface hides."""
+        faces = surface.face_index.to(torch.int64)
+        triangles = torch.unique(faces[faces >= 0])
+        row = faces.new_zeros(surface.triangles.shape[0] + 1).index_fill(0, faces.new_tensor([-1]), -1)
+        row[triangles] = torch.arange(triangles.shape[0], device=faces.device)
+        return cls(PlaneTable.of(surface.points, surface.triangles[triangles]), row[faces], tolerance)
+
+
+def _put_lines(top: Tensor, hiding: _Hiding, ends: Tensor, widths: Tensor, numbers: Tensor) -> None:
+    """Puts lines (n, 2, 3) with these numbers on top of the pixels that have none, or one with a smaller number."""
+    height, width = hiding.behind.shape
+    widths, numbers = widths.to(torch.float64), numbers.to(torch.int32)
+    steps = _lengths(ends).ceil().clamp(1, _LONGEST).to(torch.int64)
+    seen, first = _seen_samples(hiding, ends, steps)
+    visible = torch.nonzero(_any_of_each(seen, first, steps + 1)).squeeze(1)
+    ends, widths, numbers, steps, first = (part[visible] for part in (ends, widths, numbers, steps, first))
+    along, lengths = ends[:, 1, :2] - ends[:, 0, :2], _lengths(ends)
     quads, triangles = _ribbons(ends, along, lengths, widths)
     spans = triangle_spans(quads, triangles, width, height)
     line = spans.triangle // 2
     sample, sample_step = _positions(ends, along, lengths, steps, spans, line)
     first_sample, last_sample = first[line], first[line] + steps[line]
-    first_pixel = spans.row * width + spans.start
-    numbers = drawn[line].to(torch.int32)
-    top = torch.full((height * width,), -1, dtype=torch.int32, device=surface.points.device)
+    first_pixel, number = spans.row * width + spans.start, numbers[line]
     for span, offset in span_chunks(spans):
         place = sample.index_select(0, span) + sample_step.index_select(0, span) * offset
         place = place.clamp_(min=0).to(torch.int64) + first_sample.index_select(0, span)
         place = torch.minimum(place, last_sample.index_select(0, span))
-        key = torch.where(seen.index_select(0, place), numbers.index_select(0, span), -1)
+        key = torch.where(seen.index_select(0, place), number.index_select(0, span), -1)
         top.scatter_reduce_(0, first_pixel.index_select(0, span) + offset, key, "amax")
-    return top.view(height, width)
+
+
+def _lengths(ends: Tensor) -> Tensor:
+    """(n,) of lines (n, 2, 3) on the screen."""
+    lengths: Tensor = torch.linalg.vector_norm(ends[:, 1, :2] - ends[:, 0, :2], dim=-1)
+    return lengths
+
+
+def _any_of_each(seen: Tensor, first: Tensor, counts: Tensor) -> Tensor:
+    """(n,) whether any of so many samples of a line is seen."""
+    before = torch.cat([seen.new_zeros(1, dtype=torch.int64), seen.cumsum(0)])
+    return before[first + counts] > before[first]
 
 
 def _positions(
@@ -92,7 +140,7 @@ def _positions(
     return (offset * rate).sum(-1), rate[:, 0]
 
 
-def _seen_samples(surface: Surface, ends: Tensor, steps: Tensor) -> tuple[Tensor, Tensor]:
+def _seen_samples(hiding: _Hiding, ends: Tensor, steps: Tensor) -> tuple[Tensor, Tensor]:
     """Which of ``steps + 1`` samples along each line lie on or before the surface, and the first of each line."""
     counts = steps + 1
     first = counts.cumsum(0) - counts
@@ -100,16 +148,15 @@ def _seen_samples(surface: Surface, ends: Tensor, steps: Tensor) -> tuple[Tensor
     number = torch.arange(line.shape[0], device=line.device) - first[line]
     position = (number / steps[line].to(ends))[:, None]
     places = torch.lerp(ends[line, 0], ends[line, 1], position)
-    height, width = surface.face_index.shape
+    height, width = hiding.behind.shape
     column = places[:, 0].floor().clamp(0, width - 1).to(torch.int64)
     row = places[:, 1].floor().clamp(0, height - 1).to(torch.int64)
-    behind = surface.face_index[row, column]
+    behind = hiding.behind[row, column]
     seen = behind < 0
     over = torch.nonzero(~seen).squeeze(1)
     if over.shape[0]:
-        depth, slope = plane_depths(surface.points, surface.triangles, behind[over], places[over, :2])
-        tolerance = 1.5 * slope + 1e-3 * (ends[..., 2].amax() - ends[..., 2].amin())
-        seen[over] = places[over, 2] <= depth + tolerance
+        depth, slope = hiding.planes.at(behind[over], places[over, :2])
+        seen[over] = places[over, 2] <= depth + (1.5 * slope + hiding.tolerance)
     return seen, first
 
 
