@@ -10,7 +10,7 @@ import torch
 from PIL import Image
 
 from torchfair.cameras import OrthographicCamera
-from torchfair.cli import main
+from torchfair.cli import main, reflect
 from torchfair.io import load_mesh, save_mesh
 from torchfair.reflection import SmoothReference, default_camera, reflection_score
 from torchfair.shapes import PrincipalParaboloid, irregular_triangles, principal_quads
@@ -65,6 +65,29 @@ def test_table(mesh_file: str, capsys: pytest.CaptureFixture[str]) -> None:
     out = capsys.readouterr().out
     assert all(word in out for word in ("1 - SSIM", "variation", "rms", "score by view"))
     assert "wrote" not in out
+
+
+def test_large_meshes_have_a_turntable_where_it_is_asked_for(
+    mesh_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What an earlier run has drawn goes, as with ``--frames 0``."""
+    command = ["reflect", mesh_file, "-o", str(tmp_path), "--size", "64", "--force"]
+    film = tmp_path / "mesh.turntable.gif"
+    assert main([*command, "--frames", "2"]) == 0
+    assert film.is_file()
+    assert "turntable is" not in capsys.readouterr().err
+    faces = load_mesh(mesh_file).topology.num_faces
+    monkeypatch.setattr(reflect, "_MANY_FACES", faces - 1)
+    assert main(command) == 0
+    assert not film.is_file()
+    assert "--frames 24" in capsys.readouterr().err
+    assert main([*command, "--frames", "1"]) == 0
+    assert film.is_file()
+    film.unlink()
+    monkeypatch.setattr(reflect, "_FRAMES", 2)
+    monkeypatch.setattr(reflect, "_MANY_FACES", faces)
+    assert main(command) == 0
+    assert film.is_file()
 
 
 def test_files_are_written_once(mesh_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

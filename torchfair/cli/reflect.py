@@ -29,6 +29,7 @@ PICTURES = ("views.png", "differences.png")
 TURNTABLE = "turntable.gif"
 _LEAST_SIZE = 16
 _LARGEST_FRAME = 256
+_FRAMES, _MANY_FACES = 24, 500_000
 _DESCRIPTION = (
     "Renders a polygon mesh as a mirror, every face plane, among stripes, and compares the pictures with those of a "
     "smooth surface: the reference, or the same mesh smoothly shaded. The score is 1 - SSIM, averaged over views and "
@@ -62,7 +63,8 @@ def add_parser(subparsers: Any) -> None:
     add("--size", type=positive_count, default=256, metavar="PIXELS", help="pixels along a picture (default 256)")
     add("--frequency", type=positive_or_none, default=None, metavar="F", help="stripe pairs per unit of the mirrored "
         "direction (default: such that the smooth surface shows about four)")  # fmt: skip
-    add("--frames", type=count, default=24, metavar="N", help="pictures of the turntable, 0 for none (default 24)")
+    add("--frames", type=count, default=None, metavar="N", help=f"pictures of the turntable, 0 for none (default "
+        f"{_FRAMES}; none of more than {_MANY_FACES} faces, which take a second or more for each)")  # fmt: skip
     add("--no-pictures", action="store_true", help="write no pictures and no turntable")
     add_views(parser, label=False, view="score and pictures of this view alone")
     add("--force", action="store_true", help="replace files that exist")
@@ -79,6 +81,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise CommandError(f"--size {arguments.size}: pictures need at least {_LEAST_SIZE} pixels to be compared")
     mesh = read_input(arguments.input, arguments)
     reference = read_input(arguments.reference, arguments) if arguments.reference else None
+    if arguments.frames is None:
+        arguments.frames = _FRAMES if mesh.topology.num_faces <= _MANY_FACES else 0
+        if files and not arguments.frames and not arguments.no_pictures:
+            files = _files(arguments)
+            print(f"{NAME}: no turntable is drawn of so many faces; --frames {_FRAMES} does", file=sys.stderr)
     with threads_for(0, mesh.vertices.device):  # pictures of this size are made of very short operations
         view = view_of(arguments, mesh)
         with phase_progress("comparing reflections"):
@@ -206,5 +213,5 @@ def _camera(smooth: PolygonMesh, view: ViewDirection, arguments: argparse.Namesp
 
 def _files(arguments: argparse.Namespace) -> list[Path]:
     """The files to write, the report first; refuses those that exist."""
-    pictures = () if arguments.no_pictures else (*PICTURES, *((TURNTABLE,) if arguments.frames else ()))
+    pictures = () if arguments.no_pictures else (*PICTURES, *(() if arguments.frames == 0 else (TURNTABLE,)))
     return told_files(arguments, (REPORT, *pictures))
