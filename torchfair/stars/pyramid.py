@@ -34,11 +34,15 @@ def normal_pyramid(vertices: Tensor, topology: Topology, vertex: int) -> Tensor:
         MeshError: if there is no such inner vertex.
     """
     topology.check_vertices(vertices)
+    return gather(face_normals(vertices, topology), pyramid_faces(topology, vertex))
+
+
+def pyramid_faces(topology: Topology, vertex: int) -> Tensor:
+    """Numbers (k,) of the faces around an inner vertex, in the order of :func:`normal_pyramid`; errors as there."""
     for group in star_groups(topology):
         row = torch.nonzero(group.centres == vertex)
         if row.numel():
-            faces = topology.corner_faces[group.corners[int(row[0, 0])]]
-            return gather(face_normals(vertices, topology), faces)
+            return topology.corner_faces[group.corners[int(row[0, 0])]]
     raise MeshError(f"vertex {vertex} has no normal pyramid: choose a vertex inside the mesh, not on its boundary")
 
 

@@ -11,7 +11,9 @@ from torch import Tensor
 from .._names import FROM_ZERO, Names
 from .._one_mesh import one_mesh
 from ..errors import ShapeError
-from ..stars import StarClasses, StarKind, normal_pyramid
+from ..geometry import face_normals
+from ..stars import StarClasses, StarKind
+from ..stars.pyramid import pyramid_faces
 from .sheet import CAPTION, GAP, MARGIN, Sheet, points
 from .sphere import draw_arcs, draw_points, draw_rings, draw_sphere, fit_sphere_view, on_sphere
 
@@ -63,11 +65,12 @@ def picture_pyramids(
     sheet = Sheet(width, rows * (2 * CAPTION + panel) + MARGIN if chosen else 3 * CAPTION, title)
     if not chosen:
         sheet.caption("no vertex inside the mesh has a normal pyramid", MARGIN, sheet.top + CAPTION, width - 2 * MARGIN)
+    normals = face_normals(vertices, topology)
     for number, vertex in enumerate(chosen):
         left = MARGIN + (number % columns) * (panel + GAP)
         top = sheet.top + (number // columns) * (2 * CAPTION + panel)
-        normals = normal_pyramid(vertices, topology, vertex)
-        _draw(sheet, normals, left, top + 2 * CAPTION, panel)
+        pyramid = normals[pyramid_faces(topology, vertex)]
+        _draw(sheet, pyramid, left, top + 2 * CAPTION, panel)
         kind = StarKind(int(classes.kinds[vertex])).name.lower()
         if kind == "saddle":
             kind = "good saddle" if bool(classes.good[vertex]) else "bad saddle"
