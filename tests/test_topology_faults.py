@@ -82,8 +82,8 @@ def test_check_vertices() -> None:
 
 @pytest.mark.parametrize(
     "carry",
-    [copy.copy, copy.deepcopy, lambda t: pickle.loads(pickle.dumps(t)), lambda t: t.to("cpu")],
-    ids=["copy", "deepcopy", "pickle", "to"],
+    [copy.copy, copy.deepcopy, lambda t: pickle.loads(pickle.dumps(t)), lambda t: t.map_tensors(torch.clone)],
+    ids=["copy", "deepcopy", "pickle", "map_tensors"],
 )
 def test_copies_are_complete(carry: Callable[[Topology], Topology]) -> None:
     topology = Topology.from_faces(split_quads(grid_faces(4, 5)))
@@ -92,6 +92,13 @@ def test_copies_are_complete(carry: Callable[[Topology], Topology]) -> None:
     assert other is not topology
     assert same(topology, other)
     assert torch.equal(other.edge_flaps, warm)
+
+
+def test_to_where_it_is_copies_nothing() -> None:
+    """As with tensors; a topology cannot change."""
+    topology = Topology.from_faces(HYBRID)
+    assert topology.to("cpu") is topology
+    assert topology.cpu() is topology
 
 
 def test_to_moves_every_tensor() -> None:
