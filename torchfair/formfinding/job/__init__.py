@@ -1,5 +1,6 @@
 """What all formfinding jobs share: recipe, session, result."""
 
+from .live import Progress as Progress
 from .plan import OneStage as OneStage
 from .plan import Plan as Plan
 from .plan import Stage as Stage
@@ -10,6 +11,5 @@ from .recipe import Recipe as Recipe
 from .report import job_report as job_report
 from .result import JobResult as JobResult
 from .result import Level as Level
-from .session import Progress as Progress
 from .session import Session as Session
 from .solve import solved as solved

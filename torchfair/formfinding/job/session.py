@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Generic, TypeVar, cast
 
 import torch
@@ -15,61 +15,21 @@ from ..._memory import hand_back_free_memory
 from ..._threads import threads_for
 from ...errors import SettingsError
 from ...progress import phase
-from ...projection import (
-    Callback,
-    GuidedProjection,
-    IterationRecord,
-    ProjectionResult,
-    ProjectionState,
-    Status,
-    finished,
-    init,
-    resume,
-    step,
-)
+from ...projection import Callback, ProjectionResult, Status
 from ...projection.layout import State
 from ...projection.stopwatch import Stopwatch
 from ..handles import vertex_numbers
 from ..stopping import interrupted, stopped
 from .compiled_problems import CompiledProblems
+from .live import Following, Progress, followed, live_step
 from .plan import Plan, Stage
 from .recipe import Recipe
+from .snapshot import Snapshot
 
 R = TypeVar("R", bound=Recipe[Any])
 
-_MOST_TRIALS = 12  # damped steps tried in one live step
-_MOST_STEPS = 4  # of them that are accepted, more than one only where handles stay behind
-_LARGEST_LAG = 0.01  # mean edge lengths
-_WORTHWHILE = 0.8  # to which the lag has to fall in a step for another one
-_ENDLESS = 10**9
 _LARGE = 100_000  # vertices of a mesh whose freed memory is worth handing back
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one live step
-
-
-@dataclass(frozen=True)
-class Progress:
-    """What a live step did.
-
-    Attributes:
-        accepted: Whether the mesh has moved.
-        reason: Why it has not; empty if it has.
-        record: Of the last damped step; None if none was needed.
-        trials: Damped steps tried.
-    """
-
-    accepted: bool
-    reason: str
-    record: IterationRecord | None
-    trials: int
-
-
-@dataclass
-class _Following:
-    """Where live steps stand."""
-
-    stage: Stage
-    problem: GuidedProjection
-    state: ProjectionState
 
 
 class Session(Generic[R]):
@@ -106,7 +66,7 @@ class Session(Generic[R]):
         self.runs: list[ProjectionResult] = []
         self.watch: Callable[[Tensor], None] | None = None
         self._problems = CompiledProblems()
-        self._following: _Following | None = None
+        self._following: Following | None = None
         self._moved = False
 
     # ---- what it is ------------------------------------------------------------------------------------
@@ -182,37 +142,21 @@ class Session(Generic[R]):
         recipe.pulls.aim_near(recipe.placed(self.state), _LONGEST_PULL)
         with torch.no_grad(), threads_for(recipe.start.numel(), recipe.start.device):
             following = self._follow()
-            state, result, record, trials, accepted = following.state, self.state, None, 0, 0
-            lag = recipe.pulls.lag(recipe.placed(result))
-            while trials < _MOST_TRIALS and finished(state) is None:
-                state, record = step(following.problem, state, following.stage.guard)
-                trials, accepted = trials + 1, accepted + record.accepted
-                if record.accepted:
-                    result = following.stage.result(state.blocks)
-                    before, lag = lag, recipe.pulls.lag(recipe.placed(result))
-                    if accepted == _MOST_STEPS or lag <= _LARGEST_LAG or lag > _WORTHWHILE * before:
-                        break
-            if accepted and self.callback is not None and record is not None:
-                self.callback(record)
+            progress, state, result = live_step(following, recipe, self.state)
+            if progress.accepted and self.callback is not None and progress.record is not None:
+                self.callback(progress.record)
         following.state = state
-        if not accepted:
-            return Progress(False, _reason(finished(state)), record, trials)
-        self.state, self._moved = result, bool((recipe.pulls.aims != recipe.pulls.targets).any())
-        return Progress(True, "", record, trials)
+        if progress.accepted:
+            self.state, self._moved = result, bool((recipe.pulls.aims != recipe.pulls.targets).any())
+        return progress
 
-    def _follow(self) -> _Following:
+    def _follow(self) -> Following:
         """The compiled problem of live steps and where they stand, with what has changed taken in."""
         known = self._following
         if known is not None and not self._moved:
             return known
         stage = self.recipe.follower(self.recipe.predicted(self.state))
-        stage = replace(stage, settings=replace(stage.settings, max_iterations=_ENDLESS, when_settled="stop"))
-        problem = self._problems.of(stage)
-        if known is None:
-            state = init(problem, stage.blocks, replace(stage.settings, solver="auto"))
-        else:
-            state = resume(problem, known.state, stage.blocks)
-        self._following = _Following(stage, problem, state)
+        self._following = followed(stage, self._problems.of, known)
         return self._following
 
     def settle(self) -> bool:
@@ -347,23 +291,3 @@ class Session(Generic[R]):
         """
         finer = cast(R, self.recipe.refined(self.state))
         return Session(finer, callback=self.callback, live=self.recipe.pulls.everywhere)
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """Where a session stood."""
-
-    state: State
-    pulls: Any
-    settings: Any
-    of_recipe: Callable[[], None]
-    runs: list[ProjectionResult]
-    of_problems: Callable[[], None]
-    following: _Following | None
-    moved: bool
-
-
-def _reason(status: Status | None) -> str:
-    if status is None:
-        return "no step is accepted here: damping rises, try again, pull less or loosen the guards"
-    return "at rest" if status.at_rest else status.value
