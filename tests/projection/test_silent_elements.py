@@ -230,3 +230,20 @@ def test_a_run_keeps_no_jacobians_of_its_start() -> None:
     guided_projection(state, terms, settings=ProjectionSettings(max_iterations=4), callback=look)
     assert alive
     assert not any(alive)
+
+
+@pytest.mark.parametrize("far", [5.0, 1.9])
+def test_solves_end_as_with_all_elements_also_where_none_is_felt(monkeypatch: pytest.MonkeyPatch, far: float) -> None:
+    """Up to the certificate of a minimum, which looks at every term."""
+    state, terms = problem(silent=True)
+    long = replace(terms[1], data=(terms[1].data[0] - far,))
+    high_up = replace(terms[2], residual=lambda x: torch.stack([x[0, 2] - 50.0, x[0, 0] - 50.0]))
+    held = ElementTerm("held", lambda x, at: x[0] - at, [("vertices", torch.arange(30)[:, None])], (state["vertices"],))
+    chosen = [terms[0], long, high_up, terms[3], held]
+    settings = ProjectionSettings(max_iterations=200, when_settled="judge")
+    whole = guided_projection(state, chosen, settings=settings)
+    monkeypatch.setattr(portions, "_PORTION", 2)
+    some = guided_projection(state, chosen, settings=settings)
+    assert some.status is whole.status
+    assert whole.status.at_rest
+    torch.testing.assert_close(some.blocks["vertices"], whole.blocks["vertices"], rtol=1e-6, atol=1e-6)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import NamedTuple
 
@@ -44,7 +43,6 @@ def _terms(degree: int) -> list[tuple[int, int]]:
     return [(order, k) for order in range(degree + 1) for k in range(order + 1)]
 
 
-@functools.cache
 def _products(count: int) -> list[int]:
     """Number of the product of every two of so many terms among those of twice the degree, row by row."""
     terms = _terms(count)[:count]

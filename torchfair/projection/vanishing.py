@@ -29,6 +29,8 @@ def vanishing(system: LinearSystem, state: State, tolerance: float) -> Tensor:
     answer = torch.ones(count, dtype=torch.bool, device=structure.device)
     parts = zip(structure.compiled, system.of_felt(system.residuals), system.jacobians, system.roots, strict=True)
     for number, (compiled, residuals, jacobians, root) in enumerate(parts):
+        if not residuals.shape[1]:
+            continue  # none of its elements is felt: their residuals are zero
         elements = system.elements(number)
         if root.ndim == 1:
             inverse = torch.where(root > 0.0, 1.0 / root, 0.0)[elements]
