@@ -86,7 +86,8 @@ class FairSettings:
         faces_may_turn: Whether faces may turn over against the start where handles pull, step by step: for shapes that
             end far from where they begin.
         quality_weight: Weight of half the squared barriers before those bounds.
-        smoothing: ``l l*`` below this is treated as flat.
+        smoothing: ``l l*`` below this is treated as flat, in mean edge lengths. Of a fine mesh, whose mean ``l l*`` is
+            below 0.05, it falls with that mean: else all edges would be flat.
         continuation: Factors of ``smoothing`` in stages before the last, falling; empty for the last stage alone.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables too.
         constraint_weight: Weight of half the squared constraints that define the auxiliary variables.

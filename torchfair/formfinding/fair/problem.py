@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from ...constraints import lifted_normal_variation_blocks
+from ...energies import normal_variation_per_edge
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...settings.fair_settings import FairSettings
@@ -30,6 +31,8 @@ from .terms import fair_terms, planar_terms
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8
 _MOST_STAGES = 20
+_USUAL = 0.05  # mean of l l* in mean edge lengths, below which a mesh is fine
+_SHARPEST = 0.01  # part of the smoothing that is left even where a mesh is flat
 
 
 class FairProblem:
@@ -48,6 +51,7 @@ class FairProblem:
     Attributes:
         near: Closeness to the reference surface.
         bounds: On corner angles and areas of faces.
+        sharpness: By which the smoothing of the settings is multiplied: below 1 where the mesh is fine.
         input_edge: Mean edge length of the input.
         curves: Along boundary and creases.
         corners: (V,) bool, where the boundary turns.
@@ -79,6 +83,7 @@ class FairProblem:
         self.input_edge, self.curves = input_edge, rim or feature_curves(vertices, topology, settings)
         self.corners = self.curves.rim.corners
         self._tell_of_creases()
+        self.sharpness = _sharpness(vertices, topology)
         self.bounds = FaceBounds(vertices, topology, pulls)
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
@@ -293,6 +298,14 @@ class FairProblem:
             from_last=self.near.design_mode or self.pulls.everywhere,
             may_turn=self.pulls.everywhere or self.settings.faces_may_turn,
         )
+
+
+def _sharpness(vertices: Tensor, topology: Topology) -> float:
+    """Falls with ``l l*``: the finer a mesh, the smaller, until all its edges would count as flat."""
+    if not topology.num_interior_edges:
+        return 1.0
+    mean = float(normal_variation_per_edge(vertices, topology).mean())
+    return min(1.0, max(mean / _USUAL, _SHARPEST))
 
 
 def feature_curves(vertices: Tensor, topology: Topology, settings: FairSettings) -> FeatureCurves:
