@@ -160,6 +160,15 @@ def test_rows_may_stand_on_any_lines(tmp_path: Path) -> None:
         load(tmp_path, header + end + b" ".join(words[:-1]))
 
 
+def test_rows_on_any_lines_may_end_with_an_empty_list(tmp_path: Path) -> None:
+    """The line of such a face is that of its length, behind which nothing stands."""
+    header = "".join(f"property float {axis}\n" for axis in "xyz")
+    header = f"ply\nformat ascii 1.0\nelement vertex 3\n{header}element face 2\nproperty list uchar int vertex_index\n"
+    with pytest.raises(MeshFileError, match=r"face 1 has 0 corner\(s\)") as caught:
+        load(tmp_path, header + "end_header\n0 0 0 1 0 0\n0 1 0\n3 0 1 2\n0\n")
+    assert caught.value.line == 13
+
+
 def test_what_trimesh_writes(tmp_path: Path) -> None:
     import trimesh
 

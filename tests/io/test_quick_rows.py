@@ -69,7 +69,8 @@ UNUSUAL = [
     b"f 1 2 -9\n", b"f 1 2\n", b"f\n", b"f 1 2 3\\\n4\n", b"f 1 2 99999999999999999999\n", b"f 1 2 3.0\n",
     b"fo 1 2 3\n", b"vertex 1 2 3\n", b"v 1 2 3\rv 1 2 3\n", b"v 1 2 1e999\n", b"\x1av", b"\0", b"f 1/0 2/0 3/0\n",
     b"vt a\nf 1/1 2/1 3/1\n", b"vt 1\nf 1/2 2/2 3/2\n", b"vt 1\nf 1/1 2/1 3/1\nf 1 2 3\n",
-    b"f 1-2 3\n", b"f - 2 3\n", b"f 1-2/3 2/1 3\n",
+    b"f 1-2 3\n", b"f - 2 3\n", b"f 1-2/3 2/1 3\n", b"f 1-2 - 3\n", b"vn 0 0 1 \\ # c\nv 1 2 3\n", b"s 1 \\# c\nf 1 3 4\n",
+    b"\xef\xbb\xbfg a\n", b"\xef\xbb\xbf# two files in one\n",
 ]  # fmt: skip
 
 
@@ -81,6 +82,13 @@ def test_what_is_unusual_is_left_to_the_careful_way(line: bytes) -> None:
         if quick is None:
             continue
         assert_same(quick, obj._careful_mesh(PATH, text))
+
+
+def test_a_second_byte_order_mark_is_an_error() -> None:
+    """As where two files are put together."""
+    mark = b"\xef\xbb\xbf"
+    with pytest.raises(MeshFileError, match="line 6: '.ufeffg' does not start"):
+        obj.read_obj(PATH, mark + SQUARE + b"f 1 2 3\n" + mark + b"g a\nf 1 3 4\n")
 
 
 words = st.sampled_from(
@@ -113,6 +121,13 @@ def test_digits_are_rounded_as_python_does(values: list[float], digits: int) -> 
         assert rows is not None
         assert np.array_equal(rows[0].view(np.int64), np.array(list(map(float, written))).view(np.int64))
         assert rows[1].tolist() == [len(values)]
+
+
+@pytest.mark.parametrize("text", [b"1-2 3 .", b"1-2 1e 3", b"1-2 1-2 .", b"1 2 -", b"."])
+def test_numbers_that_end_early_are_none(text: bytes) -> None:
+    """Also where numpy only warns, and as many numbers come out as there are words."""
+    (portion,) = portions(text)
+    assert float_rows(portion) is None
 
 
 def test_words_are_counted_line_by_line() -> None:
@@ -162,6 +177,8 @@ def test_text_of_ply_goes_the_quick_way(size: int, faces: bytes, monkeypatch: py
         ply_text(ROWS.replace(b"\n1 1", b" 1\n1"), b"3 0 1 2\n", (4, 1)),
         ply_text(ROWS.replace(b"0.1", b"0.1 7"), b"3 0 1 2\n", (4, 1)),
         ply_text(ROWS, b"3 0 1 2.0\n", (4, 1)),
+        ply_text(ROWS, b"3 0 1 -\n", (4, 1)),
+        ply_text(ROWS, b"3 0 1-2 - 3\n4 0 1 2 3\n", (4, 2)),
         ply_text(ROWS, b"", (4, 0)),
         ply_text(ROWS, b"3 0 1 2\n", (4, 1), "element edge 0\nproperty int a\n"),
     ],

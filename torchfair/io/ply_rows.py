@@ -144,7 +144,8 @@ def read_loose_rows(
     for i in wanted:
         convert = to_floats if "f" in element.properties[i].type else to_ints
         columns.append((convert(path, text, ranges(at[:, i], counts[:, i])), counts[:, i]))
-    lines = text.lines[np.searchsorted(text.starts, at[:, 0], side="right") - 1]
+    first = at[:, 0] - (1 if element.properties and element.properties[0].count_type is not None else 0)
+    lines = text.lines[np.searchsorted(text.starts, first, side="right") - 1]
     return columns, lines, place
 
 

@@ -13,7 +13,8 @@ from .raw_mesh import Floats, Ints
 from .text import Words
 
 _V, _F, _SPACE = ord("v"), ord("f"), ord(" ")
-_CONTINUED = re.compile(rb"\\[ \t]*([\r\n]|\Z)")
+_CONTINUED = re.compile(rb"\\[ \t]*([\r\n#]|\Z)")  # a comment behind changes nothing
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
 class QuickObj(NamedTuple):
@@ -57,7 +58,7 @@ def quick_statements(data: bytes) -> QuickObj | None:
     if not is_usual(data) or b"\x1a" in data or (b"\\" in data and _CONTINUED.search(data)):
         return None
     pieces, first_line = [], 1
-    for text in portions(data.removeprefix(b"\xef\xbb\xbf")):
+    for text in portions(data.removeprefix(_BYTE_ORDER_MARK)):
         piece = _statements(text, first_line)
         if piece is None:
             return None
@@ -65,7 +66,10 @@ def quick_statements(data: bytes) -> QuickObj | None:
         first_line += text.ends.size
     columns = list(zip(*pieces, strict=True))
     points, vertex_lines, corners, textures, sizes, face_lines = (np.concatenate(c) for c in columns[:6])
-    return QuickObj(points, vertex_lines, corners, textures, sizes, face_lines, sum(columns[6]), b"".join(columns[7]),
+    rest = b"".join(columns[7])
+    if rest.startswith(_BYTE_ORDER_MARK):  # one within the file, which would pass for one at its beginning
+        return None
+    return QuickObj(points, vertex_lines, corners, textures, sizes, face_lines, sum(columns[6]), rest,
         np.concatenate(columns[8]))  # fmt: skip
 
 

@@ -7,6 +7,7 @@ refuse, and errors are its own.
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -26,6 +27,8 @@ _BLANKS = b" \t\r\n"
 _FLOAT = b"0123456789+-.eE" + _BLANKS
 _INT = b"0123456789+-" + _BLANKS
 _MOST_DIGITS = 18  # more may not fit into 64 bits
+_LONE_SIGN = re.compile(rb"[-+](?![0-9])")  # read as a zero among whole numbers
+_LAST, _LAST_VALUE = b"8.25e-217", 8.25e-217
 
 
 class Portion(NamedTuple):
@@ -70,8 +73,11 @@ def portions(data: bytes, start: int = 0) -> Iterator[Portion]:
 def float_rows(text: Portion) -> tuple[Floats, Ints] | None:
     """Numbers of a text, and how many stand on each line; None if a word is no plain decimal number."""
     counted = _word_starts(text)
-    values = _values(text.codes, np.float64, _FLOAT)
-    return None if values is None or values.size != counted[0].size else (values, counted[1])
+    values = _values(text.codes.tobytes() + _LAST, np.float64, _FLOAT)  # the last number is missed where it ends early
+    if values is None or values[-1:] != _LAST_VALUE:
+        return None
+    values = values[:-1]
+    return (values, counted[1]) if values.size == counted[0].size else None
 
 
 def int_rows(text: Portion) -> tuple[Ints, Ints] | None:
@@ -79,7 +85,10 @@ def int_rows(text: Portion) -> tuple[Ints, Ints] | None:
     starts, sizes = _word_starts(text)
     if starts.size and np.diff(starts, append=text.codes.size).max() > _MOST_DIGITS:
         return None  # blanks between words count, too: such a text is unusual enough
-    values = _values(text.codes, np.int64, _INT)
+    data = text.codes.tobytes()
+    if (b"-" in data or b"+" in data) and _LONE_SIGN.search(data):
+        return None
+    values = _values(data, np.int64, _INT)
     return None if values is None or values.size != starts.size else (values, sizes)
 
 
@@ -97,12 +106,11 @@ def _word_starts(text: Portion) -> tuple[Ints, Ints]:
     return starts, np.diff(np.searchsorted(starts, text.ends), prepend=0)
 
 
-def _values(codes: Codes, dtype: type, alphabet: bytes) -> npt.NDArray[Any] | None:
+def _values(data: bytes, dtype: type, alphabet: bytes) -> npt.NDArray[Any] | None:
     """The numbers of a text; None if there is anything else in it.
 
     A word such as ``1-2`` gives two, one such as ``1e`` ends the list: those who call compare how many there are.
     """
-    data = codes.tobytes()
     if data.translate(None, alphabet):
         return None
     if not data.strip():

@@ -69,7 +69,7 @@ def assemble(origin: Origin, points: Floats, corners: Ints, sizes: Ints) -> RawM
         face = int(np.searchsorted(offsets, outside[0], side="right")) - 1
         first = origin.first_index
         fault = (
-            f"face {face + first} uses vertex {corners[outside[0]] + first}, "
+            f"face {face + first} uses vertex {(corners[outside[:1]] + first)[0]}, "
             f"but the vertices are numbered {first}..{len(points) - 1 + first}"
         )
         raise MeshFileError(origin.path, fault, _line(origin.face_lines, face))
