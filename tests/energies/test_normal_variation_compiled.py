@@ -127,6 +127,28 @@ def test_no_number_stays_none(compiled: pytest.MonkeyPatch) -> None:
     assert torch.equal(slope.isnan(), expected.isnan())
 
 
+@pytest.mark.parametrize("value", [torch.nan, torch.inf, 1.7e308])
+def test_what_is_no_number_is_none_where_it_is_without(value: float, compiled: pytest.MonkeyPatch) -> None:
+    """Of two spheres, one of them finite, so large that squares overflow where no unit is found."""
+    vertices, topology = dented_sphere()
+    apart = torch.cat([vertices, vertices])
+    faces = topology.corners.view(-1, 3)
+    both = Topology.from_faces(torch.cat([faces, faces + topology.num_vertices]))
+    for size in (1.0, 1e150):
+        broken = size * apart
+        broken[3, 1] = value
+        same(*both_ways(broken, both, compiled))
+        compiled.setattr(compiled_module, "FEWEST_FACES", 1)
+
+
+def test_empty_batch(compiled: pytest.MonkeyPatch) -> None:
+    vertices, topology = dented_sphere()
+    for shape in ((0,), (2, 0)):
+        energy, slope = value_and_gradient(vertices.expand(*shape, -1, -1), topology)
+        assert energy.shape == shape
+        assert slope.shape == (*shape, *vertices.shape)
+
+
 def test_batch_and_value_alone(compiled: pytest.MonkeyPatch) -> None:
     vertices, topology = dented_sphere()
     batch = torch.stack([vertices, 2.0 * vertices, vertices.flip(1)]).reshape(3, 1, -1, 3)

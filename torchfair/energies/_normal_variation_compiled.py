@@ -75,7 +75,7 @@ def compiled_energy_and_gradient(vertices: Tensor, topology: Topology, gradient:
         _one(mesh, triangles, None if gradient is None else gradient[number])
         for number, mesh in enumerate(vertices.detach().contiguous())
     ]
-    return torch.stack(energies)
+    return torch.stack(energies) if energies else vertices.new_empty(0)
 
 
 def _one(vertices: Tensor, triangles: _Triangles, gradient: Tensor | None) -> Tensor:

@@ -45,7 +45,7 @@ def _write_normals(
         nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
         squared = nx * nx + ny * ny + nz * nz
         valid = squared > squares * squares * degenerate
-        inverse = min(1.0 / math.sqrt(squared), largest) if valid else 0.0 * squared
+        inverse = min(1.0 / math.sqrt(squared), largest) if valid else 0.0 / (squared + 1.0)  # 0 or no number
         out[f, 0] = nx * inverse - (0.0 if valid else far)
         out[f, 1], out[f, 2], out[f, 3] = ny * inverse, nz * inverse, inverse
 
