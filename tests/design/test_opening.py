@@ -171,6 +171,47 @@ def test_session_files_that_are_wrong_are_refused(tmp_path: Path, parts: dict[st
         read_session(path)
 
 
+FIRST: dict[str, Any] = {"do": "open", "source": "two"}
+JOB: dict[str, Any] = {"do": "fair", "handles": [[0, 0.0, 0, 1]], "held": [1], "weights": {"energy": 2.0},
+                       "choices": {"boundary": "fixed"}, "levels": 0}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [{"steps": [FIRST | {"repair": words}]} for words in
+       (["output=/etc/x"], ["force"], ["repair\n"], [3], 3, ["weld=x"])]
+    + [{"steps": steps} for steps in ([], [JOB], [FIRST | {"do": "fair"}], [FIRST | {"source": 3}], [FIRST, FIRST])]
+    + [{"steps": [FIRST, JOB | part]} for part in (
+        {"do": "reflect"}, {"do": "--force"}, {"handles": [["--force", 0, 0, 0]]}, {"handles": [[0, 0, 0]]},
+        {"held": ["--force"]}, {"weights": {"output": 1.0}}, {"weights": {"energy": "x"}}, {"levels": "1"},
+        {"choices": {"boundary": "--force"}}, {"choices": {"output": "x"}})]
+    + [{"steps": [FIRST, {"do": "mesh", "kind": kind, "count": count}]} for kind, count in
+       (("force", 9), ("quads", "--force"), ("quads", True))]
+    + [{"weights": {"form": {"output": 1.0}}}, {"choices": {"fair": {"boundary": "--force"}}},
+       {"weights": {"force": {}}}],
+    ids=str,
+)  # fmt: skip
+def test_histories_that_no_design_leads_to_are_refused(tmp_path: Path, parts: dict[str, Any]) -> None:
+    """Command lines are made of them, which people copy: no option may come from the file."""
+    path = tmp_path / "two.torchfair"
+    path.write_bytes(changed(session_bytes([triangle_document()], 0), **parts))
+    bench = Bench(tmp_path, Open(0, str(path), None, path.name))
+    assert any("is no session file" in str(error) for error in bench.errors)
+    assert bench.session.state is DesignState.EMPTY
+
+
+def test_histories_of_designs_are_read(tmp_path: Path) -> None:
+    steps = [FIRST | {"repair": ["weld=0.01", "surfaces=3,5", "split_edges"], "source": "-o.obj"},
+             {"do": "mesh", "kind": "quads", "count": 9}, JOB]  # fmt: skip
+    path = tmp_path / "two.torchfair"
+    path.write_bytes(changed(session_bytes([triangle_document()], 0), steps=steps))
+    bench = Bench(tmp_path, Open(0, str(path), None, path.name))
+    bench.say(type="command_line", id=1)
+    first = bench.messages("command_line")[-1]["text"].splitlines()[0]
+    assert first.startswith("torchfair mesh ./-o.obj ")
+    assert "--weld=0.01 --surfaces=3,5 --split-edges -o step1.obj" in first
+
+
 def test_session_files_hold_no_code_and_no_faces_of_nowhere(tmp_path: Path) -> None:
     path = tmp_path / "two.torchfair"
     document = triangle_document()

@@ -23,6 +23,8 @@ def command_line(document: Document) -> tuple[str, bool, str]:
     """
     first, *steps = document.history
     source, repair = str(first["source"]), [f"--{word.replace('_', '-')}" for word in first.get("repair", ())]
+    if source.startswith("-"):
+        source = f"./{source}"  # no option
     lines: list[str] = []
     for number, step in enumerate(steps, 1):
         target = f"step{number}.obj"

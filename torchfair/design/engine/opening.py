@@ -21,6 +21,7 @@ from ..session_file import KEPT, SUFFIX, read_session
 from .recipes import faces_of
 from .requests import Open
 from .saying import Asked, Event, Made
+from .stored_history import check_histories
 
 _SAMPLED = ", or sample them"  # how messages go on where there are surfaces
 
@@ -55,6 +56,7 @@ def _example(name: str) -> Document:
 def _of_file(request: Open, path: Path, title: str) -> Event:
     if path.suffix.lower() == SUFFIX:
         stored, kept = read_session(path), path.name.endswith(KEPT)
+        check_histories(path, stored.documents)
         return Made(request.serial, stored.documents, stored.now, camera=stored.camera, is_session=not kept)
     try:
         mesh = load_mesh(path, **options_of(request.repair))
