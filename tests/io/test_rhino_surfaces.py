@@ -207,6 +207,14 @@ def test_numbers_of_cells_are_checked(cells: Any, tmp_path: Path) -> None:
         load_mesh(tmp_path / "m.3dm", surfaces=cells)
 
 
+@pytest.mark.parametrize("cells", [99_999_999, (1, 10_000_001), (3163, 3162)])
+def test_grids_that_would_fill_the_memory_are_refused(cells: Any, tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="surfaces may ask for 10000000 cells a surface, got "):
+        load_mesh(tmp_path / "m.3dm", surfaces=cells)
+    with pytest.raises(MeshFileError, match="does not exist"):
+        load_mesh(tmp_path / "m.3dm", surfaces=(3162, 3162))
+
+
 def test_the_command_line_samples(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = written(tmp_path / "m.3dm", torus())
     assert main(["measure", str(path), "--surfaces", "40,20", "--json"]) == 0

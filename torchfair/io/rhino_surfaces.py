@@ -18,6 +18,7 @@ Cells = tuple[int, int]
 _SOUTH, _EAST, _NORTH, _WEST = range(4)  # sides of the domain, as openNURBS counts them
 _AROUND = 3  # fewest cells around a closed surface, and
 _ACROSS = 2  # between two poles: fewer give no mesh
+_MOST = 10_000_000  # cells of a surface: more take minutes and gigabytes
 
 
 class Patch(NamedTuple):
@@ -32,11 +33,13 @@ def checked_cells(surfaces: int | tuple[int, int]) -> Cells:
     """Numbers of cells in both directions.
 
     Raises:
-        SettingsError: they are not one or two whole numbers of at least 1.
+        SettingsError: they are not one or two whole numbers of at least 1, or make more than ten million cells.
     """
     cells = surfaces if isinstance(surfaces, tuple) else (surfaces, surfaces)
     if len(cells) != 2 or any(isinstance(n, bool) or not isinstance(n, int) or n < 1 for n in cells):
         raise SettingsError(f"surfaces must be one or two whole numbers of at least 1, got {surfaces!r}")
+    if cells[0] * cells[1] > _MOST:
+        raise SettingsError(f"surfaces may ask for {_MOST} cells a surface, got {cells[0]} by {cells[1]}: take fewer")
     return cells
 
 
