@@ -215,6 +215,17 @@ def test_grids_that_would_fill_the_memory_are_refused(cells: Any, tmp_path: Path
         load_mesh(tmp_path / "m.3dm", surfaces=(3162, 3162))
 
 
+@pytest.mark.parametrize("lost", ["UnderlyingSurface", "DuplicateFace"])
+def test_surfaces_that_a_damaged_file_has_lost(lost: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    box = rhino.Box(rhino.BoundingBox(rhino.Point3d(0, 0, 0), rhino.Point3d(1, 1, 1)))
+    path = written(tmp_path / "m.3dm", rhino.Brep.CreateFromBox(box))
+    monkeypatch.setattr(rhino.BrepFace, lost, lambda *given: None)
+    with pytest.raises(MeshFileError, match=r"surfaces of 'an object' are damaged"):
+        load_mesh(path, surfaces=3)
+    with pytest.raises(MeshFileError, match="no visible meshes: 1 Brep"):
+        load_mesh(path)
+
+
 def test_the_command_line_samples(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = written(tmp_path / "m.3dm", torus())
     assert main(["measure", str(path), "--surfaces", "40,20", "--json"]) == 0

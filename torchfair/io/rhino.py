@@ -76,6 +76,8 @@ def read_rhino(path: Path, data: bytes, surfaces: Cells | None = None) -> RawMes
         name, layer = item.Attributes.Name or "", _layer_of(model, item)
         found = patches_of(rhino, item.Geometry)
         trimmed += [_called(number, found, name, layer) for number, patch in enumerate(found) if patch.trimmed]
+        if surfaces is not None and any(patch.surface is None for patch in found):
+            raise MeshFileError(path, f"surfaces of {name or 'an object'!r} are damaged. Hide it, or mend it in Rhino")
         if isinstance(item.Geometry, rhino.Mesh):
             parts = [(_points(item.Geometry), _faces(item.Geometry, item.Attributes.GetUserString(_NGONS)))]
         elif found and surfaces is not None:

@@ -22,7 +22,10 @@ _MOST = 10_000_000  # cells of a surface: more take minutes and gigabytes
 
 
 class Patch(NamedTuple):
-    """A surface of an object: whether its normal is turned, and whether curves cut parts of its domain away."""
+    """A surface of an object: whether its normal is turned, and whether curves cut parts of its domain away.
+
+    None, where a damaged file holds none.
+    """
 
     surface: Any
     turned: bool = False
@@ -49,11 +52,15 @@ def patches_of(rhino: Any, geometry: Any) -> list[Patch]:
         geometry = geometry.ToBrep(False)
     if isinstance(geometry, rhino.Brep):
         faces = [geometry.Faces[i] for i in range(len(geometry.Faces))]
-        return [
-            Patch(face.UnderlyingSurface(), face.OrientationIsReversed, not face.DuplicateFace(False).IsSurface)
-            for face in faces
-        ]
+        return [_patch_of(face) for face in faces]
     return [Patch(geometry)] if isinstance(geometry, rhino.Surface) else []
+
+
+def _patch_of(face: Any) -> Patch:
+    surface, copy = face.UnderlyingSurface(), face.DuplicateFace(False)
+    if surface is None or copy is None:
+        return Patch(None)
+    return Patch(surface, face.OrientationIsReversed, not copy.IsSurface)
 
 
 def sampled(patch: Patch, cells: Cells) -> tuple[Floats, list[list[int]]]:
