@@ -7,7 +7,6 @@ refuse, and errors are its own.
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -27,7 +26,7 @@ _BLANKS = b" \t\r\n"
 _FLOAT = b"0123456789+-.eE" + _BLANKS
 _INT = b"0123456789+-" + _BLANKS
 _MOST_DIGITS = 18  # more may not fit into 64 bits
-_LONE_SIGN = re.compile(rb"[-+](?![0-9])")  # read as a zero among whole numbers
+_PLUS, _MINUS, _ZERO = b"+-0"
 _LAST, _LAST_VALUE = b"8.25e-217", 8.25e-217
 
 
@@ -85,10 +84,10 @@ def int_rows(text: Portion) -> tuple[Ints, Ints] | None:
     starts, sizes = _word_starts(text)
     if starts.size and np.diff(starts, append=text.codes.size).max() > _MOST_DIGITS:
         return None  # blanks between words count, too: such a text is unusual enough
-    data = text.codes.tobytes()
-    if (b"-" in data or b"+" in data) and _LONE_SIGN.search(data):
-        return None
-    values = _values(data, np.int64, _INT)
+    signs = np.flatnonzero((text.codes == _MINUS) | (text.codes == _PLUS))
+    if (text.codes[signs + 1] < _ZERO).any():  # a newline is behind the last one
+        return None  # numpy reads a lone sign as a zero
+    values = _values(text.codes.tobytes(), np.int64, _INT)
     return None if values is None or values.size != starts.size else (values, sizes)
 
 
