@@ -73,7 +73,7 @@ def float_rows(text: Portion) -> tuple[Floats, Ints] | None:
     """Numbers of a text, and how many stand on each line; None if a word is no plain decimal number."""
     counted = _word_starts(text)
     values = _values(text.codes.tobytes() + _LAST, np.float64, _FLOAT)  # the last number is missed where it ends early
-    if values is None or values[-1:] != _LAST_VALUE:
+    if values is None or not values.size or values[-1] != _LAST_VALUE:
         return None
     values = values[:-1]
     return (values, counted[1]) if values.size == counted[0].size else None
