@@ -1,4 +1,4 @@
-"""How much memory is left, and handing back what is free."""
+"""How much memory is left, and what becomes of memory that is freed."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+_LARGE = 300_000  # unknowns
+_MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # numbers of parameters in malloc.h of the GNU C library
+_KEPT = 1 << 26  # bytes: larger pieces are given back, or holes that nothing fits into would double the peak
 _SYSTEM = Path("/proc/meminfo")
 _GROUP = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current"))  # of a container
 
@@ -18,15 +21,34 @@ def available_memory() -> int | None:
     return min(found) if found else None
 
 
-def hand_back_free_memory() -> None:
-    """Hands memory that is free back to the system, where the C library can do that: gaps between large tensors.
+def hand_back_free_memory(unknowns: int) -> None:
+    """Hands memory that is free back to the system, where a problem is large and the C library can do that.
 
-    The allocator keeps freed blocks up to 32 MB for itself; after a phase of work on a large mesh these are a third of
-    all memory. Takes some hundredths of a second for each gigabyte.
+    The allocator keeps freed blocks up to 32 MB for itself, gaps between large tensors; after a phase of work on a
+    large mesh these are a third of all memory. Takes some hundredths of a second for each gigabyte.
     """
+    if unknowns >= _LARGE:
+        _of_c_library("malloc_trim", 0)
+
+
+def keep_freed_memory() -> bool:
+    """Lets this process keep the memory that it frees; whether that is possible here.
+
+    The GNU C library takes large tensors from the system one by one and gives them back when they are freed, and the
+    system fills every page with zeros when it is taken again: a third of the time of a command that makes hundreds of
+    tensors of a million rows. Memory is then given back at the end only, so this is for processes that do one thing
+    and end. Nothing happens on other systems.
+    """
+    kept = _of_c_library("mallopt", _MMAP_THRESHOLD, _KEPT)
+    return bool(kept) and bool(_of_c_library("mallopt", _TRIM_THRESHOLD, -1))
+
+
+def _of_c_library(function: str, *arguments: int) -> int:
+    """What a function of the GNU C library gives; 0 where there is another library."""
     if sys.platform == "linux":
-        with suppress(OSError, AttributeError):  # another C library than glibc
-            ctypes.CDLL(None).malloc_trim(0)
+        with suppress(OSError, AttributeError):
+            return int(getattr(ctypes.CDLL(None), function)(*arguments))
+    return 0
 
 
 def _of_system() -> int | None:

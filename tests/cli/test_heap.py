@@ -7,11 +7,12 @@ import sys
 
 import pytest
 
-from torchfair.cli import command, heap
+from torchfair import _memory
+from torchfair.cli import command
 
 _COUNT = """
 import resource, numpy
-from torchfair.cli.heap import keep_freed_memory
+from torchfair._memory import keep_freed_memory
 def faults():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
     for _ in range(5): numpy.ones(4_000_000)
@@ -46,4 +47,4 @@ def test_processes_of_their_own_keep_memory(name: str, monkeypatch: pytest.Monke
 
 def test_other_systems_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert not heap.keep_freed_memory()
+    assert not _memory.keep_freed_memory()

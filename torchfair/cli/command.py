@@ -10,10 +10,10 @@ from collections.abc import Callable, Sequence
 from typing import TextIO
 
 from .._interrupts import ended_like_ctrl_c
+from .._memory import keep_freed_memory
 from . import denoise, design, diagnose, fair, form, measure, mesh, reflect, subdivide, symmetric
 from .errors import CommandError
 from .exit_codes import EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, EXIT_OK, EXIT_SIGNAL, IN_WORDS
-from .heap import keep_freed_memory
 from .outcomes import outcome_of
 from .parser import CommandParser
 from .several import run_inputs

@@ -23,7 +23,7 @@ from ..errors import MeshFileError
 from .obj_attributes import ObjAttributes, face_statements, line_words, read_attributes, written_textures
 from .quick_obj import quick_statements
 from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
-from .text import Words, check_text, quote, split_words, to_floats, to_ints
+from .text import Words, check_text, first_words, quote, split_words, to_floats, to_ints
 from .text_rows import face_lines, vertex_lines
 
 _SKIPPED = frozenset(
@@ -125,11 +125,6 @@ def _plain_statements(data: bytes) -> bytes:
             blank_lines += 1
         joined += [statement] + [b""] * blank_lines
     return b"\n".join(joined)
-
-
-def first_words(text: Words) -> list[bytes]:
-    """First word of every line."""
-    return [text.words[start] for start in text.starts[:-1].tolist()]
 
 
 def statement_rows(path: Path, text: Words, *wanted: tuple[bytes, ...]) -> list[Ints]:

@@ -16,7 +16,7 @@ import numpy as np
 from .._ranges import ranges
 from ..errors import MeshFileError
 from .raw_mesh import Ints, RawMesh
-from .text import Words, to_floats, to_ints
+from .text import Words, first_words, to_floats, to_ints
 
 KEPT = (b"g", b"o", b"s", b"usemtl", b"mtllib")
 _IN_WORDS = {b"g": "groups", b"o": "object names", b"s": "smoothing groups", b"usemtl": "materials",
@@ -117,7 +117,7 @@ def read_attributes(
     Raises:
         MeshFileError: if texture coordinates are no numbers, or a corner has some that do not exist.
     """
-    keywords = [text.words[start] for start in text.starts[:-1].tolist()]
+    keywords = first_words(text)
     counts = Counter(keywords) + Counter({b"vn": normals})
     dropped = {k: counts[k] for k in sorted(counts) if k not in (*KEPT, b"v", b"f", b"fo", b"vt")}
     kept = [row for row, keyword in enumerate(keywords) if keyword in KEPT] if counts.keys() & set(KEPT) else []

@@ -14,7 +14,7 @@ from .._ranges import ranges
 from ..errors import MeshFileError
 from ..repair import weld_soup
 from .raw_mesh import Floats, Ints, Origin, RawMesh, assemble
-from .text import check_text, quote, split_words, to_floats
+from .text import check_text, first_words, quote, split_words, to_floats
 
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEAD = 84
@@ -87,7 +87,7 @@ def _read_binary(path: Path, data: bytes, notes: list[str]) -> Floats:
 def _read_text(path: Path, data: bytes) -> tuple[Floats, Ints]:
     """Corners, three of each triangle, and the line where each triangle begins."""
     text = split_words(check_text(path, data))
-    keywords = [text.words[start].lower() for start in text.starts[:-1].tolist()]
+    keywords = [word.lower() for word in first_words(text)]
     if not _KEYWORDS.issuperset(keywords):
         row = next(row for row, word in enumerate(keywords) if word not in _KEYWORDS)
         raise MeshFileError(path, f"{quote(keywords[row])} does not start a line of an STL file", int(text.lines[row]))

@@ -59,6 +59,11 @@ class Words(NamedTuple):
         return int(self.lines[np.searchsorted(self.starts, position, side="right") - 1])
 
 
+def first_words(text: Words) -> list[bytes]:
+    """First word of every line."""
+    return [text.words[start] for start in text.starts[:-1].tolist()]
+
+
 def split_words(data: bytes, first_line: int = 1) -> Words:
     """Words and lines of ``data`` as Python's ``split`` and ``splitlines`` find them, without a loop."""
     codes = np.frombuffer(data, np.uint8)

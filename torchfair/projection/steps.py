@@ -33,7 +33,6 @@ from .system import Evaluation
 from .trials import Guard, Trials
 from .vanishing import vanishing
 
-_LARGE = 300_000  # unknowns, from which on freed memory is worth handing back within each step
 _F = TypeVar("_F", bound=Callable[..., object])  # as it is, so that arguments have their names
 
 
@@ -163,7 +162,7 @@ def step(
         return after, record_of(after, timings=watch.parts)
     if are_many(problem.layout.num_unknowns):
         proposal.system.release()  # a correction makes them anew; trials need the memory
-    _hand_back(problem)
+    hand_back_free_memory(problem.layout.num_unknowns)
     trials = Trials(problem, state, proposal, guard, watch)
     try_candidates(trials, proposal, state)
     best = trials.best()
@@ -174,7 +173,7 @@ def step(
         proposal.system.release()
         state.linearised.system.release()
         del trials, proposal  # with the factor, before the next Jacobians are made
-        _hand_back(problem)
+        hand_back_free_memory(problem.layout.num_unknowns)
         with watch.part("linearise"):
             linearised, standings = _linearise(problem, best, settings, state.linearised.stiffness)
     courses = [
@@ -186,13 +185,8 @@ def step(
     after = replace(after, heeded=heeded)
     with watch.part("solve"):
         after = _judged(problem, after)
-    _hand_back(problem)
+    hand_back_free_memory(problem.layout.num_unknowns)
     return after, record_of(after, inner_iterations=iterations, timings=watch.parts)
-
-
-def _hand_back(problem: Problem) -> None:
-    if problem.layout.num_unknowns >= _LARGE:
-        hand_back_free_memory()
 
 
 def finished(state: ProjectionState) -> Status | None:

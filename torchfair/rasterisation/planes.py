@@ -1,4 +1,4 @@
-"""Depth of the planes of projected triangles beside pixel centres."""
+"""Depth of the planes of projected triangles beside pixel centres, and which of them a picture shows."""
 
 from __future__ import annotations
 
@@ -35,3 +35,23 @@ class PlaneTable(NamedTuple):
         x, y, z, right, down, nearest, farthest, slope = self.rows.index_select(0, chosen).unbind(1)
         depth = z + ((places[:, 0] - x) * right + (places[:, 1] - y) * down)
         return torch.clamp(depth, nearest, farthest), slope
+
+
+class SeenPlanes(NamedTuple):
+    """Planes of the triangles that a picture shows, each worked out once.
+
+    Attributes:
+        number: (H, W) which of them is at each pixel, -1 where there is none.
+        planes: All of them.
+    """
+
+    number: Tensor
+    planes: PlaneTable
+
+    @classmethod
+    def of(cls, points: Tensor, triangles: Tensor, nearest: Tensor) -> SeenPlanes:
+        """With projected points (V, 3), and of triangles (T, 3) the nearest one (H, W) at each pixel, -1 for none."""
+        covered = nearest >= 0
+        shown, numbers = torch.unique(nearest[covered], return_inverse=True)
+        number = torch.full_like(nearest, -1, dtype=torch.int64).masked_scatter(covered, numbers)
+        return cls(number, PlaneTable.of(points, triangles[shown]))

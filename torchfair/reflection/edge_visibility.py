@@ -13,7 +13,7 @@ from ..cameras.camera import Camera, Size, check_camera, height_and_width
 from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals
 from ..geometry._ops import dot
-from ..rasterisation.planes import PlaneTable
+from ..rasterisation.planes import SeenPlanes
 from ..rasterisation.rasterise import visible_triangles
 from ..topology import Topology
 from ..triangulation import triangulate
@@ -92,33 +92,28 @@ class _View(NamedTuple):
     """What hides places in one view.
 
     Attributes:
-        plane: (H, W) number of the plane of the nearest triangle at every pixel, -1 where there is none.
-        planes: those of all triangles that are the nearest one somewhere.
+        seen: the planes that are seen.
         slack: depth by which places may lie behind.
     """
 
-    plane: Tensor
-    planes: PlaneTable
+    seen: SeenPlanes
     slack: Tensor | float
 
     @classmethod
     def of(cls, points: Tensor, triangles: Tensor, nearest: Tensor) -> _View:
         """With projected points (V, 3) and the nearest triangle (H, W) at every pixel."""
-        covered = nearest >= 0
-        shown, numbers = torch.unique(nearest[covered], return_inverse=True)
-        plane = torch.full_like(nearest, -1).masked_scatter(covered, numbers)
-        return cls(plane, PlaneTable.of(points, triangles[shown]), _SLACK[1] * _extent(points))
+        return cls(SeenPlanes.of(points, triangles, nearest), _SLACK[1] * _extent(points))
 
     def sees(self, places: Tensor) -> Tensor:
         """Whether projected places (N, 3) lie on or before the surface at their pixel, inside the picture: (N,)."""
-        height, width = self.plane.shape
+        height, width = self.seen.number.shape
         row, column = places[:, 1].floor(), places[:, 0].floor()
         seen = (row >= 0) & (row < height) & (column >= 0) & (column < width)  # false for NaN, behind the eye
         inside = torch.nonzero(seen).squeeze(1)
-        plane = self.plane.view(-1).index_select(0, (row[inside] * width + column[inside]).long())
+        plane = self.seen.number.view(-1).index_select(0, (row[inside] * width + column[inside]).long())
         hit = torch.nonzero(plane >= 0).squeeze(1)
         covered = inside[hit]
         at = places.index_select(0, covered)
-        depths, slopes = self.planes.at(plane[hit], at[:, :2])
+        depths, slopes = self.seen.planes.at(plane[hit], at[:, :2])
         seen[covered] = at[:, 2] <= depths + _SLACK[0] * slopes + self.slack
         return seen

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from ..rasterisation.planes import PlaneTable
+from ..rasterisation.planes import SeenPlanes
 from ..rasterisation.scan import Spans, span_chunks, triangle_spans
 
 _LONGEST = 4096  # samples along one edge
@@ -66,7 +66,7 @@ def visible_lines(surface: Surface, edges: Tensor, widths: Tensor) -> Tensor:
     top = torch.full((height * width,), -1, dtype=torch.int32, device=surface.points.device)
     if drawn.shape[0]:
         tolerance = _DEPTH_SHARE * float(depths[drawn].amax() - depths[drawn].amin())
-        hiding = _Hiding.of(surface, tolerance)
+        hiding = _Hiding(SeenPlanes.of(surface.points, surface.triangles, surface.face_index), tolerance)
         for some in torch.split(drawn, _PORTION):
             _put_lines(top, hiding, surface.points.detach()[edges[some]].to(torch.float64), widths[some], some)
     return top.view(height, width)
@@ -76,28 +76,17 @@ class _Hiding(NamedTuple):
     """What hides lines.
 
     Attributes:
-        planes: Of the triangles that are seen.
-        behind: (height, width) the one at each pixel, -1 for none.
-        tolerance: Depth by which a line may lie behind it.
+        seen: The planes that are seen.
+        tolerance: Depth by which a line may lie behind them.
     """
 
-    planes: PlaneTable
-    behind: Tensor
+    seen: SeenPlanes
     tolerance: float
-
-    @classmethod
-    def of(cls, surface: Surface, tolerance: float) -> _Hiding:
-        """What a surface hides."""
-        faces = surface.face_index.to(torch.int64)
-        triangles = torch.unique(faces[faces >= 0])
-        row = faces.new_zeros(surface.triangles.shape[0] + 1).index_fill(0, faces.new_tensor([-1]), -1)
-        row[triangles] = torch.arange(triangles.shape[0], device=faces.device)
-        return cls(PlaneTable.of(surface.points, surface.triangles[triangles]), row[faces], tolerance)
 
 
 def _put_lines(top: Tensor, hiding: _Hiding, ends: Tensor, widths: Tensor, numbers: Tensor) -> None:
     """Puts lines (n, 2, 3) with these numbers on top of the pixels that have none, or one with a smaller number."""
-    height, width = hiding.behind.shape
+    height, width = hiding.seen.number.shape
     widths, numbers = widths.to(torch.float64), numbers.to(torch.int32)
     steps = _lengths(ends).ceil().clamp(1, _LONGEST).to(torch.int64)
     seen, first = _seen_samples(hiding, ends, steps)
@@ -148,14 +137,14 @@ def _seen_samples(hiding: _Hiding, ends: Tensor, steps: Tensor) -> tuple[Tensor,
     number = torch.arange(line.shape[0], device=line.device) - first[line]
     position = (number / steps[line].to(ends))[:, None]
     places = torch.lerp(ends[line, 0], ends[line, 1], position)
-    height, width = hiding.behind.shape
+    height, width = hiding.seen.number.shape
     column = places[:, 0].floor().clamp(0, width - 1).to(torch.int64)
     row = places[:, 1].floor().clamp(0, height - 1).to(torch.int64)
-    behind = hiding.behind[row, column]
+    behind = hiding.seen.number[row, column]
     seen = behind < 0
     over = torch.nonzero(~seen).squeeze(1)
     if over.shape[0]:
-        depth, slope = hiding.planes.at(behind[over], places[over, :2])
+        depth, slope = hiding.seen.planes.at(behind[over], places[over, :2])
         seen[over] = places[over, 2] <= depth + (1.5 * slope + hiding.tolerance)
     return seen, first
 

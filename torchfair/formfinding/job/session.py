@@ -28,7 +28,6 @@ from .snapshot import Snapshot
 
 R = TypeVar("R", bound=Recipe[Any])
 
-_LARGE = 100_000  # vertices of a mesh whose freed memory is worth handing back
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one live step
 
 
@@ -224,8 +223,7 @@ class Session(Generic[R]):
                 return
 
     def _run(self, stage: Stage, watch: Stopwatch) -> ProjectionResult:
-        if self.recipe.start.shape[0] >= _LARGE:
-            hand_back_free_memory()
+        hand_back_free_memory(self.recipe.start.numel())
         limit, settings = self.recipe.settings.projection.time_limit, stage.settings
         if limit is not None:
             settings = replace(settings, time_limit=max(0.0, limit - watch.elapsed))
