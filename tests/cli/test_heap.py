@@ -32,6 +32,16 @@ def test_kept_memory_is_not_taken_from_the_system_again() -> None:
     assert after < before / 4
 
 
+def test_pieces_below_the_bound_are_kept_from_the_start() -> None:
+    """Where nothing was freed before, the library would still take pieces of this size from the system one by one."""
+    count = _COUNT.replace("before, kept = faults(), keep_freed_memory()", "before, kept = 0, keep_freed_memory()")
+    words = subprocess.run([sys.executable, "-c", count], capture_output=True, text=True, check=True).stdout.split()
+    kept, _, after = map(int, words)
+    if not kept:
+        pytest.skip("not the GNU C library")
+    assert after < 64
+
+
 @pytest.mark.parametrize("name", ["measure", "diagnose", "reflect"])
 def test_processes_of_their_own_keep_memory(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The program does, a call of ``main`` in another program does not."""
