@@ -12,7 +12,18 @@ ROOT = Path(__file__).resolve().parent.parent
 FLOORS = (
     {"errors", "_interrupts", "_loading", "_memory", "_precision", "_short_repr", "_shown", "_solver_names", "_tables"}
     | {"_threads"},
-    {"_names", "_numbers", "_ranges", "_staged", "_tracing", "cameras", "linear", "progress", "rasterisation"},
+    {
+        "_names",
+        "_numbers",
+        "_ranges",
+        "_reading_words",
+        "_staged",
+        "_tracing",
+        "cameras",
+        "linear",
+        "progress",
+        "rasterisation",
+    },
     {"_atomic", "_face_hints", "_mesh_sums", "_packed_tensors", "settings"},
     {"_half_edges"},
     {"_connectivity", "projection"},

@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from torchfair import MeshError, load_mesh, save_mesh
+from torchfair._reading_words import options_of, words_of
 from torchfair.cli.command import build_parser
 from torchfair.design.command_line import command_line
 from torchfair.design.effects import Store
 from torchfair.design.engine.requests import Open
 from torchfair.design.questions import CELLS
-from torchfair.design.reading_words import options_of, words_of
 from torchfair.design.states import DesignState
 from torchfair.io import RhinoParts
 from torchfair.shapes import hybrid_roof
@@ -36,7 +36,20 @@ def test_words_say_what_options_say(options: dict[str, Any]) -> None:
     assert {name: getattr(arguments, name) for name in options} == options
 
 
-@pytest.mark.parametrize("word", ["mend", "repair=1", "weld=wide", "surfaces", "surfaces=1,2,3", "surfaces=x", ""])
+OTHERS = [
+    "mend",
+    "repair=1",
+    "weld=wide",
+    "weld=-1",
+    "weld=auto",
+    "surfaces",
+    "surfaces=0",
+    "surfaces=1,2,3",
+    "surfaces=x",
+]
+
+
+@pytest.mark.parametrize("word", [*OTHERS, ""])
 def test_other_words_are_refused(word: str) -> None:
     with pytest.raises(MeshError, match="no way to read"):
         options_of([word])

@@ -10,6 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._reading_words import words_of
 from .arguments import count
 from .errors import CommandError
 from .exit_codes import EXIT_OK
@@ -85,7 +86,6 @@ def run(arguments: argparse.Namespace) -> int:
 def _opening(arguments: argparse.Namespace) -> Open | None:
     """What is opened first."""
     from ..design.engine.requests import Open
-    from ..design.reading_words import words_of
 
     if arguments.input is None:
         return None

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from .._reading_words import UNREAD, cells_of, distance_of
 from ..errors import MeshError
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 WELD = "--weld"
 _DEFAULT = "auto"
-_READ = {"repair": False, "weld": False, "split_edges": False, "surfaces": None}
+T = TypeVar("T")
 
 
 def add_repair(parser: argparse.ArgumentParser) -> None:
@@ -33,28 +33,24 @@ def add_repair(parser: argparse.ArgumentParser) -> None:
 
 def read_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """What :func:`add_repair` has added, as arguments of :func:`~torchfair.io.load_mesh`."""
-    return {name: getattr(arguments, name, default) for name, default in _READ.items()}
+    return {name: getattr(arguments, name, default) for name, default in UNREAD.items()}
 
 
 def _tolerance(text: str) -> float | bool:
     """A distance; the word auto for the default."""
-    if text == _DEFAULT:
-        return True
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"expected a distance of at least 0, got {text!r}")
-    return value
+    return True if text == _DEFAULT else _refused(distance_of, text)
 
 
 def _cells(text: str) -> int | tuple[int, int]:
-    """How many cells a surface gets, in one or two numbers."""
-    words = text.split(",")
-    if len(words) not in (1, 2) or not all(word.isascii() and word.isdigit() and int(word) > 0 for word in words):
-        raise argparse.ArgumentTypeError(f"expected whole numbers of at least 1, such as 40 or 40,20, got {text!r}")
-    return int(words[0]) if len(words) == 1 else (int(words[0]), int(words[1]))
+    return _refused(cells_of, text)
+
+
+def _refused(of: Callable[[str], T], text: str) -> T:
+    """What a text says; argparse would hide why it is refused."""
+    try:
+        return of(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def with_default_tolerance(words: Sequence[str]) -> list[str]:

@@ -16,7 +16,7 @@ REPAIRS: Mapping[str, tuple[tuple[str, ...], str]] = {
     **{f"surfaces_{n}": ((f"surfaces={n}",), f"sample its surfaces, {n} by {n} cells each") for n in CELLS},
     **{f"surfaces_{n}_weld": ((f"surfaces={n}", "weld"), f"{n} by {n} cells each, and weld them") for n in CELLS},
 }
-"""Answers, what they mean for reading the file (see :mod:`.reading_words`), and words."""
+"""Answers, what they mean for reading the file (see ``torchfair/_reading_words.py``), and words."""
 
 
 def kept_question(name: str) -> tuple[str, tuple[tuple[str, str], ...]]:

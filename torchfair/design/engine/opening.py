@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import torch
 
+from ..._reading_words import options_of
 from ...errors import MeshError, TorchfairError
 from ...io import PolygonMesh, edge_labels_path, load_edge_labels, load_mesh
 from ...shapes import EXAMPLES, SURFACES, builtin_mesh
 from ..document import Document, Ints
 from ..limits import MOST_VERTICES
 from ..questions import CELLS, REPAIRS, answers
-from ..reading_words import options_of
 from ..session_file import KEPT, SUFFIX, read_session
 from .recipes import faces_of
 from .requests import Open

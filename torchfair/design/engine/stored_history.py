@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..._reading_words import options_of
 from ...errors import MeshFileError, TorchfairError
 from ..document import MODES, Document
-from ..reading_words import options_of
 from .sliders import settings_of
 
 
