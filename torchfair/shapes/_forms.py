@@ -7,6 +7,7 @@ from typing import NamedTuple, cast
 
 import torch
 from torch import Tensor
+from torch.autograd import forward_ad
 from torch.func import vjp
 
 Map = Callable[[Tensor, Tensor], Tensor]
@@ -29,29 +30,52 @@ def tangents(position: Map, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor]:
     return x_u, x_v
 
 
-def plain_tangents(position: Map, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor]:
-    """The same, of numbers only: without derivatives of its own, and outside function transforms.
-
-    Products of :mod:`torch.func` import the compiler of torch, which takes longer than most meshes of a surface do.
-    """
-    with torch.enable_grad():
-        u, v = u.detach().requires_grad_(), v.detach().requires_grad_()
-        components = position(u, v).unbind(-1)
-        rows = [torch.autograd.grad(x.sum(), (u, v), retain_graph=True, materialize_grads=True) for x in components]
-    x_u, x_v = (torch.stack(parts, dim=-1) for parts in zip(*rows, strict=True))
-    return x_u, x_v
-
-
 def _derivatives(function: Map, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Values ``(..., n)`` and both partial derivatives of a function of single points.
 
     One reverse product for each component, over all points at once: of three components that is faster than the
-    forward products, which compute with pairs throughout.
+    forward products, which compute with pairs throughout. Those of :mod:`torch.func` import the compiler of torch,
+    which takes longer than most meshes of a surface do: they are for where only they can be.
     """
+    if _transformed() or u.is_inference() or v.is_inference():
+        return _transformed_derivatives(function, u, v)
+    followed = torch.is_grad_enabled() and (u.requires_grad or v.requires_grad or _has_parameters(function, u, v))
+    with torch.enable_grad():
+        u, v = _cut_off(u), _cut_off(v)
+        values = function(u, v)
+        if not values.requires_grad:
+            return values, torch.zeros_like(values), torch.zeros_like(values)
+        rows = [
+            torch.autograd.grad(x.sum(), (u, v), retain_graph=True, create_graph=followed, materialize_grads=True)
+            for x in values.unbind(-1)
+        ]
+        by_u, by_v = (torch.stack(parts, dim=-1) for parts in zip(*rows, strict=True))
+    return values if followed else values.detach(), by_u, by_v
+
+
+def _transformed() -> bool:
+    """Within a transform of ``torch.func``, the compiler, forward derivatives or inference."""
+    if torch._C._are_functorch_transforms_active() or torch.compiler.is_compiling():
+        return True
+    return forward_ad._current_level >= 0 or torch.is_inference_mode_enabled()
+
+
+def _transformed_derivatives(function: Map, u: Tensor, v: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """The same by products of :mod:`torch.func`."""
     values, pulled_back = cast("tuple[Tensor, Callable[[Tensor], tuple[Tensor, Tensor]]]", vjp(function, u, v))
     components = torch.eye(values.shape[-1], dtype=values.dtype, device=values.device).unbind(0)
     by_u, by_v = zip(*(pulled_back(component.expand_as(values)) for component in components), strict=True)
     return values, torch.stack(by_u, dim=-1), torch.stack(by_v, dim=-1)
+
+
+def _has_parameters(function: Map, u: Tensor, v: Tensor) -> bool:
+    """Whether values have derivatives with respect to something else than u and v, seen at the first point."""
+    return function(u.detach().reshape(-1)[:1], v.detach().reshape(-1)[:1]).requires_grad
+
+
+def _cut_off(parameter: Tensor) -> Tensor:
+    """The same numbers, from where derivatives are taken: others that depend on them, or they on others, are apart."""
+    return parameter.view_as(parameter) if parameter.requires_grad else parameter.detach().requires_grad_()
 
 
 class Partials(NamedTuple):

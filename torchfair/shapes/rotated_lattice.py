@@ -11,7 +11,6 @@ import torch
 
 from torchfair.errors import MeshError
 
-from . import _forms
 from ._checks import require_finite
 from ._delaunay import Mask, Triangulation, triangulate
 from .shape_mesh import Points, ShapeMesh, build_mesh, check_count
@@ -79,7 +78,7 @@ def metric_scale(surface: Surface) -> tuple[Points, tuple[float, float]]:
     (u0, u1), (v0, v1) = surface.domain
     middles = (torch.arange(16, dtype=torch.float64) + 0.5) / 16
     u, v = torch.meshgrid(u0 + (u1 - u0) * middles, v0 + (v1 - v0) * middles, indexing="ij")
-    speeds = (torch.linalg.vector_norm(x, dim=-1) for x in _forms.plain_tangents(surface._position, u, v))
+    speeds = (torch.linalg.vector_norm(x, dim=-1) for x in surface.tangents(u, v))
     scale = np.array([float(speed.mean()) for speed in speeds])
     return scale, (float(scale[0] * (u1 - u0)), float(scale[1] * (v1 - v0)))
 
