@@ -120,7 +120,7 @@ def test_unreadable_input_and_unknown_example(tmp_path: Path, capsys: pytest.Cap
     assert main(["fair", str(tmp_path / "none.obj"), "-o", output]) == 2
     assert "none.obj" in error_line(capsys)
     assert main(["fair", "example:palace", "-o", output]) == 2
-    assert "roof" in error_line(capsys)
+    assert "no example 'palace': choose roof" in error_line(capsys)
 
 
 def test_interruption_writes_the_best_mesh(

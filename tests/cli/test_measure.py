@@ -9,10 +9,11 @@ import pytest
 import torch
 from helpers import cube, wavy_grid
 
-from torchfair import Topology
+from torchfair import NormalVariation, Topology
 from torchfair.cli import main
 from torchfair.geometry import face_areas
 from torchfair.io import load_mesh, save_mesh
+from torchfair.shapes import builtin_mesh
 
 CUBE_OBJ = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
 
@@ -145,3 +146,10 @@ def test_folds_that_c_does_not_see_are_said(tmp_path: Path, capsys: pytest.Captu
     assert "a dihedral angle of 180 degrees" in out
     assert main(["measure", "example:roof"]) == 0
     assert "trusted" not in capsys.readouterr().out
+
+
+def test_surfaces_are_examples_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["measure", "example:torus", "--json"]) == 0
+    vertices, topology = builtin_mesh("torus")
+    measured = strict_json(capsys.readouterr().out)
+    assert measured["normal_variation"] == pytest.approx(float(NormalVariation(topology)(vertices)))

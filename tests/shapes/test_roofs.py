@@ -134,5 +134,5 @@ def test_builtin_meshes():
 
 
 def test_unknown_name():
-    with pytest.raises(TorchfairError, match=r"no built-in mesh 'louvre'\. Choose one of: roof, hybrid_roof, sphere"):
+    with pytest.raises(TorchfairError, match="no example 'louvre': choose roof, hybrid_roof, sphere"):
         builtin_mesh("louvre")

@@ -58,7 +58,7 @@ def add_parser(subparsers: Any) -> None:
         "diagnose", help="find bad saddles and folded normals", description=_DESCRIPTION, allow_abbrev=False
     )
     add = parser.add_argument
-    add_inputs(parser, "mesh file (OBJ, OFF, PLY, STL, 3DM, DXF; GLB, ... through trimesh), or example:roof")
+    add_inputs(parser, "mesh file (OBJ, OFF, PLY, STL, 3DM, DXF; GLB, ... through trimesh), or a built-in example:NAME")
     add("--json", action="store_true", help="print one JSON object instead of tables, a line for each of several "
         "inputs")  # fmt: skip
     add("--per-vertex", action="store_true", help="with --json or --output: list the class of every vertex")

@@ -72,7 +72,7 @@ class FairCommand(JobCommand):
 
     def add_inputs(self, parser: argparse.ArgumentParser) -> None:
         """A mesh, a surface to stay close to, handles, and vertices that stay."""
-        add_inputs(parser, "mesh file, or example:roof or example:hybrid_roof")
+        add_inputs(parser, "mesh file, or a built-in example:NAME")
         add_reference(parser, "stay close to this surface instead of the input")
         add_levels(parser)
         add_handles(parser)

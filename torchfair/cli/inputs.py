@@ -33,12 +33,9 @@ def read_input(name: str, arguments: argparse.Namespace | None = None) -> Polygo
         with phase_progress(f"reading {Path(name).name}"):
             mesh = load_mesh(name, **({} if arguments is None else read_options(arguments)))
         return replace(mesh, notes=(*mesh.notes, *_inside_out(mesh)))
-    from ..shapes import EXAMPLES, builtin_mesh
+    from ..shapes import builtin_mesh
 
-    example = name.removeprefix("example:")
-    if example not in EXAMPLES:
-        raise CommandError(f"there is no example '{example}': choose {', '.join(sorted(EXAMPLES))}")
-    return PolygonMesh(*builtin_mesh(example))
+    return PolygonMesh(*builtin_mesh(name.removeprefix("example:")))
 
 
 def _inside_out(mesh: PolygonMesh) -> list[str]:

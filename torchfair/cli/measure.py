@@ -51,7 +51,7 @@ def add_parser(subparsers: Any) -> None:
     parser: argparse.ArgumentParser = subparsers.add_parser(
         "measure", help="print the smoothness of a mesh", description=_DESCRIPTION, allow_abbrev=False
     )
-    add_inputs(parser, "mesh file (OBJ, OFF, PLY, STL, 3DM, DXF; GLB, ... through trimesh), or example:roof")
+    add_inputs(parser, "mesh file (OBJ, OFF, PLY, STL, 3DM, DXF; GLB, ... through trimesh), or a built-in example:NAME")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object instead of tables, a line for each of "
         "several inputs")  # fmt: skip

@@ -53,7 +53,7 @@ def add_parser(subparsers: Any) -> None:
         "reflect", help="judge a mesh by its reflections", description=_DESCRIPTION, allow_abbrev=False
     )
     add = parser.add_argument
-    add_inputs(parser, "mesh file (OBJ, OFF, PLY, STL, 3DM, DXF; GLB, ... through trimesh), or example:roof")
+    add_inputs(parser, "mesh file (OBJ, OFF, PLY, STL, 3DM, DXF; GLB, ... through trimesh), or a built-in example:NAME")
     add("--reference", metavar="FILE", help="smooth surface to compare with: a fine mesh, mirrored with its vertex "
         "normals (default: the input itself)")  # fmt: skip
     add("--json", action="store_true", help="print one JSON object instead of a table, a line for each of several "

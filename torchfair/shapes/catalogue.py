@@ -67,4 +67,4 @@ def builtin_mesh(name: str) -> tuple[Tensor, Topology]:
     if name in SURFACES:
         mesh = irregular_triangles(SURFACES[name](), _BUILTIN_COUNT)
         return mesh.vertices, mesh.topology
-    raise TorchfairError(f"there is no built-in mesh {name!r}. Choose one of: {', '.join([*EXAMPLES, *SURFACES])}.")
+    raise TorchfairError(f"there is no example {name[:40]!r}: choose {', '.join([*EXAMPLES, *SURFACES])}")

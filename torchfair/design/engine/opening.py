@@ -13,7 +13,7 @@ import torch
 from ..._reading_words import options_of
 from ...errors import MeshError, TorchfairError
 from ...io import PolygonMesh, edge_labels_path, load_edge_labels, load_mesh
-from ...shapes import EXAMPLES, SURFACES, builtin_mesh
+from ...shapes import builtin_mesh
 from ..document import Document, Ints
 from ..limits import MOST_VERTICES
 from ..questions import CELLS, REPAIRS, answers
@@ -47,10 +47,7 @@ def opened(request: Open) -> Event:
 
 
 def _example(name: str) -> Document:
-    known = name.removeprefix("example:")
-    if known not in EXAMPLES and known not in SURFACES:
-        raise MeshError(f"there is no example {known[:40]!r}: choose {', '.join([*EXAMPLES, *SURFACES])}")
-    return document_of(PolygonMesh(*builtin_mesh(known)), name)
+    return document_of(PolygonMesh(*builtin_mesh(name.removeprefix("example:"))), name)
 
 
 def _of_file(request: Open, path: Path, title: str) -> Event:
