@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import threading
 import time
 
 import pytest
 
-from torchfair.progress import phase_progress
+from torchfair import TorchfairError
+from torchfair.cli import main
+from torchfair.progress import ProgressDisplay, phase, shown_phases
 
 
 class Terminal(io.StringIO):
@@ -19,29 +22,33 @@ class Terminal(io.StringIO):
 
 
 def wait_for(stream: io.StringIO, words: str) -> None:
+    wait_for_more(stream, "", words)
+
+
+def wait_for_more(stream: io.StringIO, before: str, words: str) -> None:
     deadline = time.monotonic() + 20.0
-    while words not in stream.getvalue():
+    while words not in stream.getvalue().removeprefix(before):
         assert time.monotonic() < deadline, stream.getvalue()
         time.sleep(0.01)
 
 
 def test_long_work_is_named_with_its_time_and_the_line_is_cleared() -> None:
     terminal = Terminal()
-    with phase_progress("judging stars", patience=0.01, stream=terminal):
+    with shown_phases(patience=0.01, stream=terminal), phase("judging stars"):
         wait_for(terminal, "judging stars  0.")
     assert terminal.getvalue().endswith("\r\x1b[K")
 
 
 def test_short_work_says_nothing() -> None:
     terminal = Terminal()
-    with phase_progress("reading", patience=60.0, stream=terminal):
+    with shown_phases(patience=60.0, stream=terminal), phase("reading"):
         pass
     assert terminal.getvalue() == ""
 
 
 def test_logs_are_left_alone() -> None:
     stream = io.StringIO()
-    with phase_progress("reading", patience=0.0, stream=stream):
+    with shown_phases(patience=0.0, stream=stream), phase("reading"):
         time.sleep(0.05)
     assert stream.getvalue() == ""
 
@@ -51,7 +58,7 @@ def test_an_interrupt_clears_the_line_and_goes_on() -> None:
     terminal, before = Terminal(), threading.active_count()
 
     def interrupted() -> None:
-        with phase_progress("reading", patience=0.01, stream=terminal):
+        with shown_phases(patience=0.01, stream=terminal), phase("reading"):
             wait_for(terminal, "reading")
             raise KeyboardInterrupt
 
@@ -64,8 +71,42 @@ def test_an_interrupt_clears_the_line_and_goes_on() -> None:
 def test_a_closed_terminal_does_not_end_the_work() -> None:
     terminal = Terminal()
     done = False
-    with phase_progress("reading", patience=0.0, stream=terminal):
+    with shown_phases(patience=0.0, stream=terminal), phase("reading"):
         terminal.close()
         time.sleep(0.05)
         done = True
     assert done
+
+
+def test_a_display_within_shows_phases_in_its_place() -> None:
+    """And the line comes back after it."""
+    terminal, log = Terminal(), io.StringIO()
+    with shown_phases(patience=0.01, stream=terminal), phase("judging stars"):
+        wait_for(terminal, "judging stars")
+        with ProgressDisplay(60, stream=log):
+            drawn = terminal.getvalue()
+            assert drawn.endswith("\r\x1b[K")
+            with phase("checking"):
+                time.sleep(0.05)
+            assert terminal.getvalue() == drawn
+        wait_for_more(terminal, drawn, "judging stars")
+    assert terminal.getvalue().endswith("\r\x1b[K")
+
+
+def test_commands_show_what_they_are_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+
+    def read(name: str, arguments: object) -> object:
+        with phase(f"reading {name}"):
+            wait_for(terminal, "reading roof.obj  2.")
+        raise TorchfairError("read enough")
+
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setattr("torchfair.cli.measure.read_input", read)
+    assert main(["measure", "roof.obj"]) == 2
+    assert terminal.getvalue().endswith("\r\x1b[Ktorchfair measure: error: read enough\n")
+
+
+def test_commands_run_without_a_stderr() -> None:
+    with contextlib.redirect_stderr(None), shown_phases(), phase("reading"):
+        pass

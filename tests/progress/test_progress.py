@@ -208,7 +208,7 @@ def test_durations_in_words(seconds: float, words: str) -> None:
 
 
 def test_a_phase_is_named_once_it_takes_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(progress, "_PATIENCE", 0.05)
+    monkeypatch.setattr(progress, "PATIENCE", 0.05)
     stream = Flushing()
     with ProgressDisplay(60, stream=stream):
         with phase("short"):
@@ -230,7 +230,7 @@ def until(holds: Callable[[], bool]) -> None:
 
 
 def test_nothing_is_named_after_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(progress, "_PATIENCE", 0.05)
+    monkeypatch.setattr(progress, "PATIENCE", 0.05)
     stream = Flushing()
     before = threading.active_count()
     with suppress(KeyboardInterrupt), ProgressDisplay(60, stream=stream), phase("interrupted"):

@@ -11,6 +11,7 @@ from typing import TextIO
 
 from .._interrupts import ended_like_ctrl_c
 from .._memory import keep_freed_memory
+from ..progress import shown_phases
 from . import denoise, design, diagnose, fair, form, measure, mesh, reflect, subdivide, symmetric
 from .errors import CommandError
 from .exit_codes import EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, EXIT_OK, EXIT_SIGNAL, IN_WORDS
@@ -96,9 +97,10 @@ def _parse(argv: Sequence[str] | None, parsed: list[argparse.Namespace]) -> int:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    if isinstance(getattr(arguments, "input", None), list):
-        return run_inputs(arguments, getattr(arguments, "teller", json_or_plain))
-    return int(arguments.run(arguments))
+    with shown_phases():
+        if isinstance(getattr(arguments, "input", None), list):
+            return run_inputs(arguments, getattr(arguments, "teller", json_or_plain))
+        return int(arguments.run(arguments))
 
 
 def _abandon_broken(stream: TextIO) -> None:

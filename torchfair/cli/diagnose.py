@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..progress import phase_progress
+from ..progress import phase
 from .arguments import count
 from .chosen_vertices import NUMBERS, ChosenVertices
 from .errors import CommandError
@@ -83,12 +83,12 @@ def run(arguments: argparse.Namespace) -> int:
     mesh = read_input(arguments.input, arguments)
     chosen = ChosenVertices(mesh)
     drawn = _drawn(arguments, chosen)
-    with phase_progress("judging stars"):
+    with phase("judging stars"):
         diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
     numbers, worst = diagnosis.counts(), diagnosis.worst_vertices(arguments.worst)
-    with phase_progress("comparing edges with principal directions"):
+    with phase("comparing edges with principal directions"):
         advice = layout_advice(mesh.vertices, mesh.topology, diagnosis, names=mesh.names)
-    with phase_progress("trying what mends the worst stars"):
+    with phase("trying what mends the worst stars"):
         _explain(worst, mesh)
     report = {
         **numbers,
@@ -129,7 +129,7 @@ def write(
     """Writes report and pictures, all or nothing; ``drawn`` vertices have their pyramids drawn."""
     with written_with_report(files, report, arguments):
         if len(files) > 1:
-            with phase_progress("drawing pictures"):
+            with phase("drawing pictures"):
                 _draw(files[1:], mesh, diagnosis, report, drawn, view=view_of(arguments, mesh), force=arguments.force)
 
 

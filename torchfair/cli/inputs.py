@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..progress import phase_progress
+from ..progress import phase
 from .arguments import count
 from .chosen_vertices import NUMBERS, ChosenVertices
 from .errors import CommandError
@@ -30,7 +30,7 @@ def read_input(name: str, arguments: argparse.Namespace | None = None) -> Polygo
     from ..io import PolygonMesh, load_mesh
 
     if not name.startswith("example:"):
-        with phase_progress(f"reading {Path(name).name}"):
+        with phase(f"reading {Path(name).name}"):
             mesh = load_mesh(name, **({} if arguments is None else read_options(arguments)))
         return replace(mesh, notes=(*mesh.notes, *_inside_out(mesh)))
     from ..shapes import builtin_mesh

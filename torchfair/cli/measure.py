@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..progress import phase_progress
+from ..progress import phase
 from .arguments import count
 from .element_tables import add_tables, tables_of, write_table
 from .errors import CommandError
@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     mesh, reference = read_input(arguments.input, arguments), read_reference(arguments)
     found = _measured(mesh, reference, arguments)
     for path, table in tables.items():
-        with phase_progress(f"writing {path.name}"):
+        with phase(f"writing {path.name}"):
             write_table(path, table(mesh.vertices, mesh.topology, mesh.names), overwrite=arguments.force)
     if arguments.json:
         from ..io import to_json
@@ -137,19 +137,19 @@ def _measured(mesh: PolygonMesh, reference: tuple[Tensor, Topology] | None, argu
     )
 
     both = mesh.vertices, mesh.topology
-    with phase_progress("measuring energies, lengths and angles"):
+    with phase("measuring energies, lengths and angles"):
         quantities, lists = measure_mesh(*both), {}
     if reference is not None:
-        with phase_progress("measuring how far E is from stationary on the reference"):
+        with phase("measuring how far E is from stationary on the reference"):
             stationarity = measure_stationarity(*both, ReferenceSurface(*reference))
         quantities += stationarity.quantities()
         lists = {"per_vertex": stationarity.per_vertex()} if arguments.per_vertex else {}
     values = {quantity.key: quantity.value for quantity in quantities}
     measures = {key: value or 0.0 for key, value in values.items()}
-    with phase_progress("looking for faces that run through each other"):
+    with phase("looking for faces that run through each other"):
         doubts = curvature_doubts({**measures, "self_intersections": count_meetings(*both)})
     most = max(arguments.worst, 1)
-    with phase_progress("looking for the worst edges and panels"):
+    with phase("looking for the worst edges and panels"):
         edges, panels = worst_edges(*both, most), worst_panels(*both, most)
     words = verdict(values, edges, panels, doubts, names=mesh.names)
     return Measured(quantities, doubts, edges[: arguments.worst], panels[: arguments.worst], words, lists)

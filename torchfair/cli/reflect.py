@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..progress import phase_progress
+from ..progress import phase
 from .arguments import count, positive_count, positive_or_none
 from .errors import CommandError
 from .exit_codes import EXIT_NOT_REACHED, EXIT_OK
@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"{NAME}: no turntable is drawn of so many faces; --frames {_FRAMES} does", file=sys.stderr)
     with threads_for(0, mesh.vertices.device):  # pictures of this size are made of very short operations
         view = view_of(arguments, mesh)
-        with phase_progress("comparing reflections"):
+        with phase("comparing reflections"):
             score = _score(mesh, reference, view, arguments)
         report: dict[str, Any] = dict(score.numbers())
         report |= _compared(score) | {
@@ -169,7 +169,7 @@ def write(
             from ..viewing.picture_reflections import picture_reflection_differences, picture_reflections
 
             name = Path(arguments.input).name
-            with phase_progress("drawing pictures"):
+            with phase("drawing pictures"):
                 picture_reflections(pictures[0], score, name, overwrite=arguments.force)
                 picture_reflection_differences(pictures[1], score, name, overwrite=arguments.force)
     for film in films:

@@ -5,6 +5,6 @@ from .display import Record as Record
 from .frames import frame_progress as frame_progress
 from .phases import listening as listening
 from .phases import phase as phase
-from .shown_phase import phase_progress as phase_progress
+from .shown_phases import shown_phases as shown_phases
 from .time_left import TimeLeft as TimeLeft
 from .time_left import duration as duration

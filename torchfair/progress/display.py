@@ -11,6 +11,7 @@ from contextlib import ExitStack, suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, TextIO
 
+from .long_phases import PATIENCE, LongPhases
 from .phases import listening
 from .time_left import TimeLeft, duration
 
@@ -22,7 +23,6 @@ _REFRESH = 0.1  # seconds between repaints of a terminal
 _BAR = 20  # columns
 _PLAIN_LINES = 20  # wanted number of plain lines
 _SILENCE = 10.0  # seconds without a plain line after which the next record is shown
-_PATIENCE = 2.0  # seconds after which a phase is named that has not ended
 _SYMBOLS = {"normal_variation": "E", "angle_variation": "E'", "total_absolute_curvature": "C"}
 
 
@@ -92,7 +92,7 @@ class ProgressDisplay:
         self._last: Record | None = None
         self._shown: Record | None = None
         self._repainted = 0.0
-        self._timer: threading.Timer | None = None
+        self._phases = LongPhases(lambda words, _: self._write(f"{words} ...", None), patience=PATIENCE)
         self._listening = ExitStack()
         self._writing = threading.Lock()
 
@@ -109,14 +109,14 @@ class ProgressDisplay:
         elif self._console is not None:
             self._stream = self._console.file
         self._repainted = 0.0 if self._live is not None else time.monotonic()
-        self._listening.enter_context(listening(self._begin))
+        self._listening.enter_context(listening(self._phases))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._listening.close()
-        self._begin("")
+        self._phases("")
         if self._last is not None and self._last is not self._shown:
             self._show(self._last)
         if self._live is not None:
@@ -147,16 +147,6 @@ class ProgressDisplay:
             else:
                 self._live.update(drawn or line, refresh=True)
             self._repainted = time.monotonic()
-
-    def _begin(self, words: str) -> None:
-        """Names a phase in a while, if it has not ended by then; "" for none."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        if words:
-            self._timer = threading.Timer(_PATIENCE, self._write, (f"{words} ...", None))
-            self._timer.daemon = True
-            self._timer.start()
 
     def _words(self, record: Record) -> list[str]:
         left = self._time_left.seconds()

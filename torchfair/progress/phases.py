@@ -10,7 +10,7 @@ Listener = Callable[[str], object]
 
 
 class _Here(threading.local):
-    """Of this thread: who listens, and the phases that have begun, the innermost last."""
+    """Of this thread: listeners, and phases that have begun; the innermost last."""
 
     def __init__(self) -> None:
         self.listeners: list[Listener] = []
@@ -22,7 +22,7 @@ _here = _Here()
 
 @contextmanager
 def phase(words: str) -> Iterator[None]:
-    """Tells the listeners of this thread what is done in its body.
+    """Tells who listens in this thread what is done in its body.
 
     A phase within another one is told in its place until it ends. Costs nothing that matters where nobody listens.
 
@@ -47,14 +47,21 @@ def phase(words: str) -> Iterator[None]:
 
 @contextmanager
 def listening(listener: Listener) -> Iterator[None]:
-    """Calls ``listener`` with the words of every phase that begins in this thread, and with "" where none is left."""
+    """Calls ``listener`` with the words of every phase that begins in this thread, and with "" where none is left.
+
+    Of several the innermost listens; for the others no phase goes on until it is gone.
+    """
+    if _here.phases:
+        _tell("")
     _here.listeners.append(listener)
     try:
         yield
     finally:
-        _here.listeners.remove(listener)
+        _here.listeners.pop()
+        if _here.phases:
+            _tell(_here.phases[-1])
 
 
 def _tell(words: str) -> None:
-    for listener in list(_here.listeners):
-        listener(words)
+    if _here.listeners:
+        _here.listeners[-1](words)
