@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 import sys
 import webbrowser
 from contextlib import suppress
@@ -53,6 +52,8 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serves until Ctrl-C."""
+    import asyncio
+
     from ..design.running import require_websockets, serve
 
     require_websockets()

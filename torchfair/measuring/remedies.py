@@ -15,7 +15,6 @@ from .._threads import threads_for
 from ..errors import MeshError, TorchfairError
 from ..geometry import edge_lengths, star_normals
 from ..geometry.tangent_basis import tangent_bases
-from ..principal import LARGE_MISALIGNMENT, principal_edges_from_directions
 from ..stars import classify_stars, pyramid_self_intersections
 from ..topology import Topology
 from .diagnosis import Diagnosis
@@ -170,6 +169,8 @@ def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis, *,
     if not topology.is_triangular:
         remesh = f"torchfair mesh --quads {topology.num_faces}"
         return [f"{words}, too many to mend one by one: lower E by torchfair fair, or remesh by {remesh}"]
+    from ..principal import LARGE_MISALIGNMENT, principal_edges_from_directions
+
     try:
         aligned = principal_edges_from_directions(vertices, topology, allow_exceptions=True)
     except TorchfairError:  # stars without a normal, in a whole component
