@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, get_type_hints
 
 import pytest
 import torch
@@ -23,8 +23,10 @@ from torchfair.constraints import (
     sphere_blocks,
 )
 from torchfair.errors import DerivativeError, SettingsError, ShapeError
+from torchfair.formfinding import FairRecipe, JobLayer
 from torchfair.principal import principal_edges_of_lattice
-from torchfair.projection import ElementTerm, OneSided, ProjectionLayer, ProjectionSettings
+from torchfair.projection import BackwardRule, ElementTerm, OneSided, ProjectionLayer, ProjectionSettings
+from torchfair.projection.implicit import BackwardOptions
 from torchfair.shapes import Catenoid, principal_triangles
 
 Terms = Callable[[Mapping[str, Tensor]], Sequence[ElementTerm]]
@@ -411,3 +413,15 @@ def test_second_derivatives_are_refused() -> None:
 def test_options_out_of_range(option: dict[str, object], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         ProjectionLayer(TOP, well, **option)
+
+
+def test_both_layers_take_the_options_of_one_rule() -> None:
+    """A new one is known to type checkers as well, and reaches the rule."""
+    kinds = {field.name: get_type_hints(BackwardRule)[field.name] for field in fields(BackwardRule)}
+    assert get_type_hints(BackwardOptions) == kinds
+    options: BackwardOptions = {"unrolled_steps": 3, "accuracy": 1e-3, "products": 7, "on_fault": "gauss-newton"}
+    assert ProjectionLayer(TOP, well, **options).rule == BackwardRule(**options)
+    mesh = wavy_grid(3, 3)
+    assert JobLayer(FairRecipe(*mesh), **options).rule == BackwardRule(**options)
+    with pytest.raises(TypeError, match="newton"):
+        ProjectionLayer(TOP, well, newton=3)  # type: ignore[call-arg]

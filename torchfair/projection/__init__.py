@@ -4,6 +4,7 @@ from ..settings.projection_settings import ProjectionSettings as ProjectionSetti
 from .adjoint import AdjointSolution as AdjointSolution
 from .guided_projection import GuidedProjection as GuidedProjection
 from .guided_projection import guided_projection as guided_projection
+from .implicit import BackwardRule as BackwardRule
 from .layer import LayerInfo as LayerInfo
 from .layer import ProjectionLayer as ProjectionLayer
 from .loss import LogAbsolute as LogAbsolute

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, Literal, Protocol, TypedDict, get_args
 
 import torch
 from torch import Tensor
@@ -37,9 +37,30 @@ class Told(Protocol):
         """The check before derivatives."""
 
 
+class BackwardOptions(TypedDict, total=False):
+    """What layers take of a :class:`BackwardRule`, by name."""
+
+    backward: Backward
+    unrolled_steps: int
+    solver: str | LinearSolver
+    accuracy: float
+    products: int
+    on_fault: OnFault
+
+
 @dataclass(frozen=True)
 class BackwardRule:
-    """How derivatives of a minimum are found; see :class:`~torchfair.projection.ProjectionLayer`.
+    """How derivatives of a minimum are found.
+
+    Attributes:
+        backward: ``"implicit"``, or ``"unroll"`` through the last steps: ``unrolled_steps`` Gauss-Newton steps at the
+            end found, as accurate as that iteration is after so many steps; refused where it moves away.
+        unrolled_steps: See there.
+        solver: Linear solver of the backward pass, by default that of the solve.
+        accuracy: Relative remainder of the adjoint equations.
+        products: Most products with H for one linear system.
+        on_fault: What happens if the end is no such minimum: ``"error"``, or ``"gauss-newton"``, derivatives by the
+            positive Gauss-Newton matrix with a warning that names the condition that failed.
 
     Raises:
         SettingsError: an option out of range.

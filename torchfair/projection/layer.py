@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import torch
 from torch import Tensor, nn
@@ -15,7 +15,7 @@ from ..linear import LinearSolver
 from ..settings.projection_settings import ProjectionSettings
 from .adjoint import AdjointSolution
 from .guided_projection import GuidedProjection
-from .implicit import Backward, BackwardRule, MakeTerms, Minimum, OnFault
+from .implicit import BackwardOptions, BackwardRule, MakeTerms, Minimum
 from .layout import State
 from .result import ProjectionResult
 from .stationary_point import StationaryPoint, polished
@@ -56,17 +56,10 @@ class ProjectionLayer(nn.Module):
             parameters belong into it.
         fixed: Masks as for :func:`guided_projection`: unknowns that stay as they are.
         settings: Of the solve.
-        backward: ``"implicit"``, or ``"unroll"`` through the last steps: ``unrolled_steps`` Gauss-Newton steps at the
-            end found, as accurate as that iteration is after so many steps; refused where it moves away.
-        unrolled_steps: See there.
-        solver: Linear solver of the backward pass, by default that of the solve.
         tolerance: The end is polished by Newton steps until the next one is shorter than this, relative to the extent
             of the blocks.
         newton_steps: Most of these.
-        accuracy: Relative remainder of the adjoint equations.
-        products: Most products with H for one linear system.
-        on_fault: What happens if the end is no such minimum: ``"error"``, or ``"gauss-newton"``, derivatives by the
-            positive Gauss-Newton matrix with a warning that names the condition that failed.
+        options: Of the backward pass, see :class:`BackwardRule`.
 
     Raises:
         SettingsError: an option out of range.
@@ -92,17 +85,12 @@ class ProjectionLayer(nn.Module):
         *,
         fixed: Mapping[str, Tensor] | None = None,
         settings: ProjectionSettings | None = None,
-        backward: Backward = "implicit",
-        unrolled_steps: int = 10,
-        solver: str | LinearSolver = "auto",
         tolerance: float = 1e-7,
         newton_steps: int = 8,
-        accuracy: float = 1e-8,
-        products: int = 500,
-        on_fault: OnFault = "error",
+        **options: Unpack[BackwardOptions],
     ) -> None:
         super().__init__()
-        self.rule = BackwardRule(backward, unrolled_steps, solver, accuracy, products, on_fault)
+        self.rule = BackwardRule(**options)
         check_count("newton_steps", newton_steps, least=0)
         check_number("tolerance", tolerance, above=True, finite=True)
         self.terms, self.settings, self.tolerance, self.newton_steps = terms, settings, tolerance, newton_steps

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import torch
 from torch import Tensor, nn
 
 from ..._numbers import check_count, check_number
 from ...errors import ShapeError
-from ...linear import LinearSolver
-from ...projection.implicit import Backward, BackwardRule, OnFault
+from ...projection.implicit import BackwardOptions, BackwardRule
 from ..job import Recipe
 from ..job.compiled_problems import CompiledProblems
 from .finished import Finish, FinishedMesh, JobLayerInfo, copied
@@ -42,10 +41,9 @@ class JobLayer(nn.Module):
 
     Args:
         recipe: The job; it is copied.
-        backward, unrolled_steps, solver, accuracy, products, on_fault: See
-            :class:`~torchfair.projection.ProjectionLayer`.
         tolerance: The mesh is at its minimum where the next Newton step is shorter than this, relative to the extent.
         steps: Most steps with exact second derivatives on the way there.
+        options: Of the backward pass, see :class:`~torchfair.projection.BackwardRule`.
 
     Raises:
         SettingsError: an option is out of range, or the job does not end in a minimum.
@@ -68,20 +66,15 @@ class JobLayer(nn.Module):
         self,
         recipe: Recipe[Any],
         *,
-        backward: Backward = "implicit",
-        unrolled_steps: int = 10,
-        solver: str | LinearSolver = "auto",
         tolerance: float = 1e-7,
         steps: int = 100,
-        accuracy: float = 1e-8,
-        products: int = 500,
-        on_fault: OnFault = "error",
+        **options: Unpack[BackwardOptions],
     ) -> None:
         super().__init__()
-        self.rule = BackwardRule(backward, unrolled_steps, solver, accuracy, products, on_fault)
+        self.rule = BackwardRule(**options)
         check_count("steps", steps, least=1)
         check_number("tolerance", tolerance, above=True, finite=True)
-        self.finish = Finish(tolerance, steps, products)
+        self.finish = Finish(tolerance, steps, self.rule.products)
         self._recipe, self._problems = copied(recipe), CompiledProblems()
         trial = copied(recipe)
         trial.final(trial.state())
