@@ -12,10 +12,11 @@ import torch
 from torch import Tensor
 
 from . import _connectivity, _joined_topology
+from ._joined_tables import JOINED_TABLES
 from ._loading import safe_to_load
 from ._packed_tensors import pack, unpack
 from ._tables import cached_table, outside_of_transforms
-from ._topology_tables import CHEAP_TABLES, FANS, JOINED_TABLES, MeshTables
+from ._topology_tables import CHEAP_TABLES, FANS, MeshTables
 from .errors import MeshError, ShapeError
 
 Manifold = Literal["vertices", "edges"]

@@ -13,9 +13,9 @@ from .fair.planar_quads import PLANAR_QUADS as PLANAR_QUADS
 from .fair.planar_quads import planar_quads as planar_quads
 from .fair.recipe import FairRecipe as FairRecipe
 from .fair.recipe import minimise_normal_variation as minimise_normal_variation
+from .form.minimise import minimise_absolute_curvature as minimise_absolute_curvature
 from .form.prescribed_normals import prescribed_normals as prescribed_normals
 from .form.recipe import FormRecipe as FormRecipe
-from .form.recipe import minimise_absolute_curvature as minimise_absolute_curvature
 from .form.start_surface import start_surface as start_surface
 from .job import JobResult as JobResult
 from .job import Level as Level

@@ -7,7 +7,7 @@ import math
 import torch
 from torch import Tensor
 
-from .._topology_tables import Elements
+from .._joined_tables import Elements
 from ..topology import Topology
 
 _FINE = 14  # binary digits: parts of a mesh that may be so much smaller than its extent
