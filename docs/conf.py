@@ -33,7 +33,7 @@ html_theme = "furo"
 html_title = f"torchfair {__version__}"
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
-html_js_files = ["copy.js"]
+html_js_files = ["copy.js", "breaks.js"]
 mathjax_path = "mathjax/startup.js"  # docs/vendor_mathjax.py says where it is from
 mathjax3_config = {
     "loader": {"load": ["input/tex", "output/chtml"]},

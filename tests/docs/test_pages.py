@@ -1,4 +1,5 @@
-"""The built pages in Chromium without a network: formulas are set, listings copied, nothing is wider than a phone."""
+"""The built pages in Chromium without a network: formulas are set, listings copied, nothing is wider than a phone, nor
+a table than a laptop."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from browser_tools import FLAGS, chromium
 
 PAGES = Path(__file__).parents[2] / "docs" / "_build"
 PHONE = {"width": 390, "height": 844}
+LAPTOP = {"width": 1440, "height": 900}
 
 pytestmark = pytest.mark.browser
 
@@ -70,3 +72,12 @@ def test_nothing_is_wider_than_a_phone(browser: Any, path: Path) -> None:
     page = opened(browser.new_context(offline=True, viewport=PHONE), path, [])
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
     assert page.locator("meta[name=description]").count() == 1 or path.stem in ("genindex", "search", "py-modindex")
+
+
+@pytest.mark.parametrize("path", sorted(PAGES.glob("*.html")), ids=lambda path: path.stem)
+def test_tables_fit_on_a_laptop(browser: Any, path: Path) -> None:
+    """Nothing in them scrolls sideways, and the page does not either."""
+    page = opened(browser.new_context(offline=True, viewport=LAPTOP), path, [])
+    assert page.evaluate("document.documentElement.scrollWidth") <= LAPTOP["width"]
+    wide = "(boxes) => boxes.filter((box) => box.scrollWidth > box.clientWidth + 1).map((box) => box.innerText)"
+    assert page.locator(".table-wrapper").evaluate_all(wide) == []
