@@ -34,12 +34,16 @@ PICTURES = {
     "fig18_hybrid_roof": "overlay.png",
     "fig21_principal_remeshing": "edges.png",
     "fig_reflection_ranking": "reflections.png",
+    "inverse_design": "reflections.png",
     "optimise_reflection": "reflections.png",
     "polar_duals": "dual.png",
     "repair_saddles": "saddle_term.png",
     "rounding_off": "rounding_off.png",
     "saddle_samplings": "stars.png",
+    "shape_from_mirrors": "surfaces.png",
+    "train_form_finding": "surfaces.png",
     "train_height_field": "surfaces.png",
+    "train_signed_distance": "surfaces.png",
 }
 """Which of the pictures of an experiment stands in the gallery."""
 

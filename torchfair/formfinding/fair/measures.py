@@ -93,6 +93,22 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
     promises = []
     if not problem.has_other_goals:
         promises.append(Promise("E", before["normal_variation"], after["normal_variation"]))
+    promises += _distance_promises(problem, before, after)
+    if settings.boundary == "free" and not problem.has_other_goals:
+        least, remedy = _KEPT_AREA * before["area"], "it has shrunk, not become smoother: raise free_boundary_weight"
+        promises.append(Promise("area", least, after["area"], "at least", remedy=remedy))
+    promises += _face_promises(problem, before, after)
+    promises += _panel_promises(problem, after)
+    if bool(problem.pulls.pulled.any()):
+        away, edge = after["largest_handle_distance"], before["mean_edge_length"]
+        remedy = "faces would become too small or too thin; allow smaller angles and areas, or pull less"
+        promises.append(handle_promise(away, edge, remedy=remedy))
+    return promises
+
+
+def _distance_promises(problem: FairProblem, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
+    """How far the mesh is from the reference, and it from the mesh."""
+    settings, promises = problem.settings, []
     bounded = problem.near.limits is not None and not problem.near.design_mode
     if bounded:
         asked = max(settings.distance_limit or 0.0, problem.distance_for_planarity)
@@ -107,9 +123,12 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         remedy = "something is cut off: lower crease_angle, refine, or raise distance_back"
         name = "distance of the input from the result"
         promises.append(Promise(name, most, reached, unit=_EDGES, remedy=remedy, of_settings=asked))
-    if settings.boundary == "free" and not problem.has_other_goals:
-        least, remedy = _KEPT_AREA * before["area"], "it has shrunk, not become smoother: raise free_boundary_weight"
-        promises.append(Promise("area", least, after["area"], "at least", remedy=remedy))
+    return promises
+
+
+def _face_promises(problem: FairProblem, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
+    """Angles, areas and sides of faces, and that none is turned over."""
+    settings, promises = problem.settings, []
     if settings.quality_weight:
         asked = math.degrees(settings.smallest_angle)
         least, reached = min(asked, before["smallest_angle_degrees"]), after["smallest_angle_degrees"]
@@ -125,6 +144,12 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
     if not settings.faces_may_turn:
         remedy = "pull less, in several steps, or allow it: faces_may_turn"
         promises.append(Promise("faces turned over", 0.0, after["flipped_faces"], remedy=remedy))
+    return promises
+
+
+def _panel_promises(problem: FairProblem, after: Mapping[str, float]) -> list[Promise]:
+    """That panels are planar, or no less so, and edges kept flat."""
+    settings, promises = problem.settings, []
     if problem.panels.planar.numel() and settings.planarity_weight:
         promises.append(Promise(_OF_PANELS, PLANAR_PROMISE, after["largest_planarity"], remedy=_FREER))
     if problem.panels.nearly.faces.numel():
@@ -136,10 +161,6 @@ def fair_promises(problem: FairProblem, before: Mapping[str, float], after: Mapp
         remedy = "let the boundary glide or be free, raise distance_limit, or let them fold: flat none"
         reached = after["largest_fold_degrees"]
         promises.append(Promise("folds of edges kept flat", FLAT_PROMISE, reached, unit="degrees", remedy=remedy))
-    if bool(problem.pulls.pulled.any()):
-        away, edge = after["largest_handle_distance"], before["mean_edge_length"]
-        remedy = "faces would become too small or too thin; allow smaller angles and areas, or pull less"
-        promises.append(handle_promise(away, edge, remedy=remedy))
     return promises
 
 
