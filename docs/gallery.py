@@ -34,7 +34,6 @@ PICTURES = {
     "fig18_hybrid_roof": "overlay.png",
     "fig21_principal_remeshing": "edges.png",
     "fig_reflection_ranking": "reflections.png",
-    "inverse_design": "losses.png",
     "optimise_reflection": "reflections.png",
     "polar_duals": "dual.png",
     "repair_saddles": "saddle_term.png",
