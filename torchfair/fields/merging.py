@@ -67,7 +67,7 @@ def merge_singularities(
         touched |= beside
     if not touched.any():
         return angles, matched
-    return _refit(frames, angles, moved, directions, smoothing, touched, symmetry), moved
+    return refitted(frames, angles, moved, directions, smoothing, touched, symmetry), moved
 
 
 def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, radius: float) -> tuple[Ints, Bools]:
@@ -96,7 +96,7 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
         steps += [(a, b, int(charges[goal])) for a, b in itertools.pairwise(path[: middle + 1])]
         steps += [(b, a, int(charges[start])) for a, b in itertools.pairwise(path[middle:])]
         touched[path] = True
-    return _carried(frames, matched, steps), touched
+    return carried_charges(frames, matched, steps), touched
 
 
 def _onto(frames: FaceFrames, matched: Ints, charges: Ints, stay: Bools, radius: float) -> tuple[Ints, Bools]:
@@ -119,7 +119,7 @@ def _onto(frames: FaceFrames, matched: Ints, charges: Ints, stay: Bools, radius:
             path.append(int(before[row, path[-1]]))
         steps += [(a, b, int(charges[start])) for a, b in itertools.pairwise(path[::-1])]
         touched[path] = True
-    return _carried(frames, matched, steps), touched
+    return carried_charges(frames, matched, steps), touched
 
 
 def _split(
@@ -147,7 +147,7 @@ def _split(
                 path.append(int(before[path[-1]]))
             steps += [(a, b, most) for a, b in itertools.pairwise(path[::-1])]
             touched[path] = True
-        matched = _carried(frames, matched, steps)
+        matched = carried_charges(frames, matched, steps)
     return matched, touched
 
 
@@ -163,7 +163,7 @@ def _inner_edges(frames: FaceFrames) -> sp.csr_matrix:
     return sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(size, size))
 
 
-def _carried(frames: FaceFrames, matched: Ints, steps: list[tuple[int, int, int]]) -> Ints:
+def carried_charges(frames: FaceFrames, matched: Ints, steps: list[tuple[int, int, int]]) -> Ints:
     """Matchings after charges went along edges, from one vertex to another: a step more or less over each edge."""
     a, b, charges = np.array(steps, np.int64).reshape(-1, 3).T
     edges = edge_numbers(frames.topology, torch.from_numpy(np.stack([a, b], 1))).numpy()
@@ -172,7 +172,7 @@ def _carried(frames: FaceFrames, matched: Ints, steps: list[tuple[int, int, int]
     return moved
 
 
-def _refit(
+def refitted(
     frames: FaceFrames,
     angles: Floats,
     matched: Ints,
@@ -180,9 +180,21 @@ def _refit(
     smoothing: float,
     touched: Bools,
     symmetry: Symmetry,
+    rings: int = _RINGS,
 ) -> Floats:
-    """Angles that fit new matchings, by the smoothness and the principal directions of the field."""
-    near = frames.grown(np.asarray(touched[frames.triangles].any(1)), _RINGS)
+    """Angles that fit new matchings, by the smoothness and the principal directions of the field.
+
+    Args:
+        frames: of the triangles.
+        angles: (F,) of the field before.
+        matched: (I,) quarter turns over edges.
+        directions: principal directions.
+        smoothing: as for the field.
+        touched: (V,) bool: vertices around which directions count less.
+        symmetry: of the field, 2 or 4.
+        rings: of triangles around those.
+    """
+    near = frames.grown(np.asarray(touched[frames.triangles].any(1)), rings)
     trust = directions.confidence * np.where(near, _LOOSE, 1.0)
     pull = frames.areas * trust / smoothing**2 + 1e-9 * frames.areas / frames.areas.mean()
     stiffness = connection_laplacian(frames, np.ones(len(frames.faces), complex)) + sp.diags(pull)

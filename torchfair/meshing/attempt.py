@@ -44,6 +44,7 @@ class Plan:
         smoothing: length over which directions are smoothed.
         align: whether boundary runs and creases become lines.
         creases: whether they are kept.
+        even: whether rows follow crosses, whose directions change places nowhere: see :func:`even_crosses`.
         apart: (n, 3) places near which creases do not become lines.
     """
 
@@ -51,6 +52,7 @@ class Plan:
     smoothing: float
     align: bool
     creases: bool = True
+    even: bool = False
     apart: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..errors import MeshError
 from ..fields import (
     Directions,
     FaceFrames,
@@ -21,6 +22,7 @@ from ..fields.frames import Floats
 from ..fields.matchings import QUARTER
 from .creases import Creases, crease_pull
 from .cut_graph import CutGraph, cut_open
+from .even_crosses import even_crosses
 
 _FIRM = 10.0  # weight of creases that the field follows
 
@@ -33,6 +35,8 @@ def combed(
     merging: float,
     creases: Creases | None = None,
     angle: float = 0.0,
+    *,
+    even: bool = False,
 ) -> CutGraph:
     """The mesh cut open, with a field of directions.
 
@@ -49,9 +53,23 @@ def combed(
         merging: singular vertices that are closer are merged, but for corners of creases.
         creases: of the surface.
         angle: between chains of creases and the field, up to which it follows them.
+        even: whether crosses are made to do, where they do not: see :func:`even_crosses`.
+
+    Raises:
+        MeshError: if they do anyway, or cannot be made to.
     """
     stay = None if creases is None else creases.corners
     has_creases = creases is not None and bool(creases.chains)
+    if even:
+        angles = _field(frames, directions, smoothing, 4, creases, angle)
+        matched = matchings(frames, angles, 4)
+        angles, matched = merge_singularities(frames, angles, matched, directions, smoothing, merging, 4, stay)
+        before = matched
+        angles, matched = even_crosses(frames, angles, matched, directions, smoothing, stay)
+        graph = cut_open(frames, angles, matched, vertex_charges(frames, angles, matched))
+        if matched is before or (graph.quarters % 2).any():
+            raise MeshError("crosses have no odd index that can be joined with another")
+        return _lengthwise(frames, directions, graph)
     tried: tuple[Symmetry, ...] = (4, 2) if symmetry == 2 else (4,)
     for of in tried:
         graphs = []
@@ -69,8 +87,11 @@ def combed(
         graph = min(graphs, key=lambda rated: rated[0])[1]
         if symmetry == 4 or not (graph.quarters % 2).any():
             break
-    if symmetry == 4 or of == 2:
-        return graph
+    return graph if symmetry == 4 or of == 2 else _lengthwise(frames, directions, graph)
+
+
+def _lengthwise(frames: FaceFrames, directions: Directions, graph: CutGraph) -> CutGraph:
+    """Crosses turned by a quarter where the other direction is nearer to the principal one, by the whole surface."""
     along = directions.values * np.exp(-2j * graph.angles)
     across = float(frames.areas @ along.real) < 0
     return replace(graph, angles=graph.angles + QUARTER) if across else graph

@@ -164,6 +164,7 @@ def mesh_components(
     spacing: float,
     settings: MeshingSettings,
     first: list[int] | None = None,
+    resolution: float | None = None,
 ) -> Pieces:
     """Meshes every component with a lattice.
 
@@ -173,6 +174,7 @@ def mesh_components(
         spacing: length of edges.
         settings: of the meshes.
         first: number of the plan of every component that gave a mesh with another spacing; by default none has.
+        resolution: length of edges for which triangles are made fine enough, by default the spacing.
 
     Raises:
         NoMeshError: if one has no valid mesh.
@@ -184,7 +186,9 @@ def mesh_components(
     for number, (part, directions) in enumerate(zip(parts, surface.fields, strict=True)):
         smoothing = settings.smoothing_length(surface.fits[number].rings)
         begin = None if first is None else first[number]
-        mesh, words, plan = mesh_component(part, directions, lattices[number], spacing, smoothing, settings, begin)
+        mesh, words, plan = mesh_component(
+            part, directions, lattices[number], spacing, smoothing, settings, begin, resolution
+        )
         taken.append(plan)
         if words:
             name = _name(number, len(surface.parts))

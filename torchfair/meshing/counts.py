@@ -32,7 +32,9 @@ def mesh_to_count(
     """Meshes with a spacing, then with others until the count is about that asked for; and the spacing taken.
 
     Directions that turn make lines diverge, so that cells are larger or smaller than the spacing says, and cells that
-    the boundary clips are joined. What comes nearest is taken; where that is off by more than 15 %, a note says so.
+    the boundary clips are joined. All meshes are made from the same triangles, those fine enough for the first
+    spacing: others would have other counts. What comes nearest is taken; where that is off by more than 15 %, a note
+    says so.
 
     Args:
         surface: with its directions.
@@ -48,14 +50,14 @@ def mesh_to_count(
     best = mesh_components(surface, lattices, spacing, settings)
     if count is None:
         return best, spacing
-    tried, step, began = [(spacing, faces_of(best))], 1.0, time.process_time()
+    first, tried, step, began = spacing, [(spacing, faces_of(best))], 1.0, time.process_time()
     short = replace(settings, time_limit=settings.time_limit * _SHARE)
     for _ in range(_CORRECTIONS):
         off = abs(faces_of(best) / count - 1)
         if off <= _ENOUGH or time.process_time() - began > 2 * short.time_limit:
             break
         other = spacing * (next_spacing(tried, count) / spacing) ** step
-        again = _again(surface, lattices, other, short, best, off)
+        again = _again(surface, lattices, (other, first), short, best, off)
         if again is None:
             step /= 2
             continue
@@ -82,11 +84,17 @@ def next_spacing(tried: list[tuple[float, int]], count: int) -> float:
 
 
 def _again(
-    surface: ReadSurface, lattices: list[Lattice], spacing: float, settings: MeshingSettings, best: Pieces, off: float
+    surface: ReadSurface,
+    lattices: list[Lattice],
+    spacings: tuple[float, float],
+    settings: MeshingSettings,
+    best: Pieces,
+    off: float,
 ) -> Pieces | None:
-    """The mesh with another spacing; None where there is none, or none as good in all but the count."""
+    """The mesh with another spacing than the first; None where there is none, or none as good in all but the count."""
+    spacing, first = spacings
     try:
-        again = mesh_components(surface, lattices, spacing, settings, best.plans)
+        again = mesh_components(surface, lattices, spacing, settings, best.plans, first)
     except NoMeshError:
         return None
     lost = again.creases.length < (1 - _ROUNDING) * best.creases.length

@@ -22,6 +22,7 @@ from .lattice import Lattice
 from .surface import DesignSurface
 
 _SMOOTHER = (1.0, 4.0, 16.0, 64.0)  # times the smoothing length
+_ROWS = ((1.0, False), (4.0, False), (1.0, True), (4.0, True), (16.0, False), (64.0, False))  # and whether even crosses
 _SHARE = 0.5  # of the time limit, for plans that keep creases
 _RETRIES = 2  # with creases not aligned where a map is turned over
 _SPACINGS = (1.0, 0.967, 1.037, 0.934, 1.08)  # counts up and down by 7 and 15 %
@@ -48,9 +49,9 @@ class Rung(NamedTuple):
     smoother: float
 
     @property
-    def kind(self) -> tuple[float, bool, bool]:
+    def kind(self) -> tuple[float, bool, bool, bool]:
         """What it has in common with plans of a spacing a little different."""
-        return self.smoother, self.plan.align, self.plan.creases
+        return self.smoother, self.plan.align, self.plan.creases, self.plan.even
 
 
 def mesh_component(
@@ -61,6 +62,7 @@ def mesh_component(
     smoothing: float,
     settings: MeshingSettings,
     first: int | None = None,
+    resolution: float | None = None,
 ) -> tuple[PieceMesh, str, int]:
     """The mesh of a component by the first plan that gives a valid one, what was changed, and the plan's number.
 
@@ -72,6 +74,7 @@ def mesh_component(
         smoothing: of directions, over the spacing.
         settings: of the mesh.
         first: number of the plan to begin with, which gave a mesh with another spacing; then spacings are not changed.
+        resolution: length of edges for which triangles are made fine enough, by default the spacing.
 
     Raises:
         NoMeshError: if none does.
@@ -83,10 +86,11 @@ def mesh_component(
     number = 0
 
     @cache
-    def finer(spacing: float, kept: bool) -> tuple[DesignSurface, Directions]:
+    def finer(kept: bool) -> tuple[DesignSurface, Directions]:
+        length = spacing if resolution is None else resolution
         if kept or not creased:
-            return surface.cut_finer(directions, spacing)
-        return plain.cut_finer(smooth(), spacing)
+            return surface.cut_finer(directions, length)
+        return plain.cut_finer(smooth(), length)
 
     @cache
     def smooth() -> Directions:
@@ -94,17 +98,20 @@ def mesh_component(
 
     @cache
     def creases(spacing: float, kept: bool) -> Creases:
-        triangles = finer(spacing, kept)[0]
+        triangles = finer(kept)[0]
         return find_creases(triangles.frames, triangles.sharp, settings.corner_angle, spacing)
 
     @cache
-    def graph(spacing: float, smoothing: float, kept: bool) -> CutGraph:
-        triangles, carried = finer(spacing, kept)
-        merging, sharp = settings.merging * spacing, creases(spacing, kept)
-        return combed(triangles.frames, carried, lattice.symmetry, smoothing, merging, sharp, settings.boundary_angle)
+    def graph(spacing: float, smoothing: float, kept: bool, even: bool) -> CutGraph:
+        triangles, carried = finer(kept)
+        merging, sharp, angle = settings.merging * spacing, creases(spacing, kept), settings.boundary_angle
+        try:
+            return combed(triangles.frames, carried, lattice.symmetry, smoothing, merging, sharp, angle, even=even)
+        except MeshError as error:
+            raise FailedAttemptError(str(error), hopeless=True) from None
 
-    hopeless: set[tuple[float, bool, bool]] = set()
-    for place, rung in _from(first, list(plans(spacing, smoothing, settings, creased))):
+    hopeless: set[tuple[float, bool, bool, bool]] = set()
+    for place, rung in _from(first, list(plans(spacing, smoothing, settings, creased, lattice.symmetry == 2))):
         plan = rung.plan
         limit = settings.time_limit * (_SHARE if plan.creases else 1.0)
         late = time.process_time() - began > limit
@@ -113,8 +120,9 @@ def mesh_component(
         for _ in range(1 + _RETRIES * (settings.fallback and plan.creases and plan.align)):
             number += 1
             try:
-                field, sharp = graph(plan.spacing, plan.smoothing, plan.creases), creases(plan.spacing, plan.creases)
-                triangles = finer(plan.spacing, plan.creases)[0]
+                field = graph(plan.spacing, plan.smoothing, plan.creases, plan.even)
+                sharp = creases(plan.spacing, plan.creases)
+                triangles = finer(plan.creases)[0]
                 return attempt(triangles, sharp, field, lattice, plan, settings), _in_words(plan, rung.words), place
             except FailedAttemptError as error:
                 failure = error if failure is None or failure.vertex < 0 else failure
@@ -140,21 +148,32 @@ def _in_words(plan: Plan, words: str) -> str:
     return ", ".join(filter(None, [words, f"creases not aligned near {places}" if places else ""]))
 
 
-def plans(spacing: float, smoothing: float, settings: MeshingSettings, creased: bool = False) -> Iterator[Rung]:
-    """What is tried, one after the other; without the creases at last, where there are any."""
+def plans(
+    spacing: float, smoothing: float, settings: MeshingSettings, creased: bool = False, rows: bool = False
+) -> Iterator[Rung]:
+    """What is tried, one after the other; without the creases at last, where there are any.
+
+    Args:
+        spacing: length of edges.
+        smoothing: of directions, over the spacing.
+        settings: of the mesh.
+        creased: whether there are creases.
+        rows: whether the lattice has rows, which may follow either of two principal directions.
+    """
     for kept in (True, False) if creased else (False,):
         can_align = settings.align_boundary or kept
         curves = "boundary and creases" if kept else "boundary"
         for scale in _SPACINGS:
-            for smoother in _SMOOTHER:
+            for smoother, even in _ROWS if rows else [(smoother, False) for smoother in _SMOOTHER]:
                 for align in (True, False) if can_align else (False,):
                     words = [
                         "creases not kept" if creased and not kept else "",
                         f"directions smoothed over {smoothing * smoother:g} edges" if smoother != 1 else "",
+                        "rows not along the same principal curvature everywhere" if even else "",
                         f"{curves} not aligned" if can_align and not align else "",
                         f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces" if scale != 1 else "",
                     ]
-                    plan = Plan(spacing * scale, spacing * smoothing * smoother, align, kept)
+                    plan = Plan(spacing * scale, spacing * smoothing * smoother, align, kept, even)
                     yield Rung(plan, ", ".join(filter(None, words)), scale, smoother)
 
 

@@ -22,6 +22,7 @@ from ..topology import Topology
 from ..triangulation import triangulate
 from .bridges import cut_bridges
 from .creases import sharp_edges
+from .numbering import numbered_by_geometry, turned_by_geometry
 from .sizes import SizeField
 
 _COARSE = 1.0  # mean edge over the spacing above which triangles are cut
@@ -111,13 +112,15 @@ def components_of(vertices: Tensor, topology: Topology, crease_angle: float = 0.
     if flat:
         words = ". torchfair.repair_mesh (--repair) drops them; or remesh them."
         raise PlacedError(f"{len(flat)} face(s) have no area: faces ", few("face", flat), words)
-    triangles = triangulate(points, topology).triangles
+    triangles = triangulate(points, turned_by_geometry(points, topology)).triangles
     whole = Topology.from_faces(triangles, topology.num_vertices)
     labels = face_components(whole)
     parts = []
     for label in range(int(labels.max()) + 1):
         chosen = triangles[labels == label]
         numbers, corners = torch.unique(chosen, return_inverse=True)
+        order, corners = numbered_by_geometry(points[numbers], corners)
+        numbers = numbers[order]
         part, connectivity = points[numbers], Topology.from_faces(corners, len(numbers))
         part, connectivity, sharp = cut_bridges(part, connectivity, sharp_edges(part, connectivity, crease_angle))
         new = torch.full((len(part) - len(numbers),), -1)
