@@ -127,13 +127,15 @@ def _split(
 ) -> tuple[Ints, Bools]:
     """Matchings with vertices of too large an index split, where fewer than three faces would meet.
 
-    One part after the other goes as far as the radius, each as far from those before as it can, among vertices inside.
+    One part after the other goes as far as the radius, and to neighbours at least, each as far from those before as it
+    can, among vertices inside.
     """
     touched, graph = np.zeros(len(frames.points), bool), _inner_edges(frames)
     most = _MOST_POSITIVE[symmetry]
     for vertex in np.flatnonzero(charges > most).tolist():
-        distance, before = dijkstra(graph, True, np.array(vertex), True, limit=2 * radius)
-        near = np.flatnonzero(np.isfinite(distance) & (distance <= radius) & (charges == 0))
+        reach = max(radius, float(graph[vertex].data.max(initial=0.0)))
+        distance, before = dijkstra(graph, True, np.array(vertex), True, limit=2 * reach)
+        near = np.flatnonzero(np.isfinite(distance) & (distance <= reach) & (charges == 0))
         steps: list[tuple[int, int, int]] = []
         taken: list[int] = []
         for _ in range((int(charges[vertex]) - 1) // most):

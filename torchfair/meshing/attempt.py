@@ -16,6 +16,7 @@ from .boundary_cells import Compact, compact, tidy_boundary
 from .boundary_runs import BoundaryRun, find_runs
 from .crease_runs import crease_lines
 from .creases import Creases
+from .cut_cells import cut_cells
 from .cut_graph import CutGraph
 from .integers import split_integers
 from .lattice import Lattice
@@ -26,7 +27,7 @@ from .seams import Seams, find_seams
 from .surface import DesignSurface
 from .tracing import Cells, trace_cells
 from .untangling import is_hopeless, untangled
-from .verification import shape_of, verified_topology, verify_creases
+from .verification import shape_of, verified_topology, verify_corners, verify_creases
 
 _ANISOTROPY = 30.0  # of the map: 1 triples the angles to directions, 300 wins little and stretches edges
 _UNTANGLED = 2  # maps, the best first
@@ -116,12 +117,16 @@ def attempt(
         whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1)))
         made = verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
         verify_creases(made, whole.creases, creases)
+        rows = _rows(cells, whole)
+        faces = cut_cells(whole.positions, whole.faces, rows) if lattice.has_rows else whole.faces
+        verified_topology(faces, len(whole.positions), shape_of(surface.topology))
+        verify_corners(whole.positions, faces)
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None
     singular = np.flatnonzero(graph.charges)
     places, charges = frames.points[singular], graph.charges[singular]
     sharp = frames.points[frames.edges[creases.edges]]
-    return PieceMesh(whole.positions, whole.faces, _rows(cells, whole), whole.creases, sharp, places, charges)
+    return PieceMesh(whole.positions, whole.faces, rows, whole.creases, sharp, places, charges)
 
 
 def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:

@@ -18,6 +18,7 @@ _ENOUGH = 0.08  # by which the count may differ, relative, so that no other spac
 _FAR = 0.25  # beyond that other settings are taken for the sake of the count
 _SAID = 0.15  # by which it may differ without a word
 _INSIDE = 0.2  # of the logarithms between two spacings: a third one keeps so far from both
+_FINER = 0.8  # of the first spacing, below which triangles are cut finer than for it
 _ROUNDING = 1e-9
 
 
@@ -32,9 +33,8 @@ def mesh_to_count(
     """Meshes with a spacing, then with others until the count is about that asked for; and the spacing taken.
 
     Directions that turn make lines diverge, so that cells are larger or smaller than the spacing says, and cells that
-    the boundary clips are joined. All meshes are made from the same triangles, those fine enough for the first
-    spacing: others would have other counts. What comes nearest is taken; where that is off by more than 15 %, a note
-    says so.
+    the boundary clips are joined. Spacings that are not much smaller than the first are laid on the same triangles:
+    finer ones would have other counts. What comes nearest is taken; where that is off by more than 15 %, a note says so.
 
     Args:
         surface: with its directions.
@@ -93,8 +93,9 @@ def _again(
 ) -> Pieces | None:
     """The mesh with another spacing than the first; None where there is none, or none as good in all but the count."""
     spacing, first = spacings
+    resolution = first if spacing > _FINER * first else spacing
     try:
-        again = mesh_components(surface, lattices, spacing, settings, best.plans, first)
+        again = mesh_components(surface, lattices, spacing, settings, best.plans, resolution)
     except NoMeshError:
         return None
     lost = again.creases.length < (1 - _ROUNDING) * best.creases.length

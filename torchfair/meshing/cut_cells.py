@@ -11,7 +11,8 @@ Pair = tuple[int, int]
 
 
 def cut_cells(positions: Floats, faces: list[list[int]], rows: set[Pair]) -> list[list[int]]:
-    """Triangles of cells: whole ones are cut along the diagonal that leads forward, clipped ones by ears.
+    """Triangles of cells: whole ones are cut along the diagonal that leads forward, clipped ones so that
+    no angle is smaller than it has to be.
 
     A whole cell has two opposite sides on rows. Seen along a row, counterclockwise, its diagonal starts where a side on
     a row starts, whichever of the two: half a turn brings the lattice to itself.
@@ -28,7 +29,7 @@ def cut_cells(positions: Floats, faces: list[list[int]], rows: set[Pair]) -> lis
             a, b, c, d = face[on_row.index(True) :] + face[: on_row.index(True)]
             triangles += [[a, b, c], [a, c, d]]
         else:
-            triangles += _ears(positions, list(face))
+            triangles += _best_cut(positions, face)
     return triangles
 
 
@@ -36,21 +37,30 @@ def _pair(a: int, b: int) -> Pair:
     return (a, b) if a < b else (b, a)
 
 
-def _ears(positions: Floats, face: list[int]) -> list[list[int]]:
-    """Cuts off the corner with the shortest diagonal that turns no triangle over, again and again."""
-    triangles = []
+def _best_cut(positions: Floats, face: list[int]) -> list[list[int]]:
+    """Triangles of a polygon by diagonals such that the smallest of their angles is as large as it can be."""
     normal = area_vector(positions, face)
-    while len(face) > 3:
-        ears = [(_ear_cost(positions, face, k, normal), k) for k in range(len(face))]
-        corner = min(ears)[1]
-        triangles.append([face[corner - 1], face[corner], face[(corner + 1) % len(face)]])
-        face = face[:corner] + face[corner + 1 :]
-    return [*triangles, face]
+    best: dict[tuple[int, int], tuple[float, list[list[int]]]] = {(k, k + 1): (np.inf, []) for k in range(len(face))}
+    for width in range(2, len(face)):
+        for first in range(len(face) - width):
+            last = first + width
+            tried = []
+            for middle in range(first + 1, last):
+                triangle = [face[first], face[middle], face[last]]
+                (before, left), (after, right) = best[first, middle], best[middle, last]
+                angle = _smallest_angle(positions, triangle, normal)
+                tried.append((min(before, after, angle), [*left, triangle, *right]))
+            best[first, last] = max(tried, key=lambda rated: rated[0])
+    return best[0, len(face) - 1][1]
 
 
-def _ear_cost(positions: Floats, face: list[int], corner: int, normal: Floats) -> tuple[bool, float]:
-    """Whether cutting off a corner turns it or the rest over, and the length of the cut."""
-    before, after = face[corner - 1], face[(corner + 1) % len(face)]
-    rest = face[:corner] + face[corner + 1 :]
-    areas = [area_vector(positions, part) @ normal for part in ([before, face[corner], after], rest)]
-    return bool(min(areas) <= 0), float(np.linalg.norm(positions[before] - positions[after]))
+def _smallest_angle(positions: Floats, triangle: list[int], normal: Floats) -> float:
+    """In radians, negative where the triangle is turned over."""
+    corners = positions[triangle]
+    sides = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(sides, axis=1)
+    area = area_vector(positions, triangle)
+    doubled = 2 * np.linalg.norm(area)
+    products = np.sort(lengths * np.roll(lengths, 1))
+    angle = float(np.arcsin(min(doubled / products[-1], 1.0))) if products[-1] > 0 else 0.0
+    return angle if area @ normal > 0 else angle - np.pi

@@ -111,7 +111,7 @@ def mesh_component(
             raise FailedAttemptError(str(error), hopeless=True) from None
 
     hopeless: set[tuple[float, bool, bool, bool]] = set()
-    for place, rung in _from(first, list(plans(spacing, smoothing, settings, creased, lattice.symmetry == 2))):
+    for place, rung in _from(first, list(plans(spacing, smoothing, settings, creased, lattice.has_rows))):
         plan = rung.plan
         limit = settings.time_limit * (_SHARE if plan.creases else 1.0)
         late = time.process_time() - began > limit

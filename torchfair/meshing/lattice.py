@@ -25,6 +25,11 @@ class Lattice:
     spacings: tuple[float, float]
 
     @property
+    def has_rows(self) -> bool:
+        """Whether its points lie in rows along one direction, and its cells are cut into triangles."""
+        return self.symmetry == 2
+
+    @property
     def aligned(self) -> tuple[int, ...]:
         """Coordinates that are constant along the field or across it."""
         return tuple(k for k in (0, 1) if self.shear[k][1 - k] == 0)

@@ -14,6 +14,7 @@ EQUILATERAL = math.sqrt(3) / 2
 """Distance of rows of equilateral triangles over the spacing along them."""
 
 _MOST = 1.4  # distance of rows over the spacing
+_FLATTEST = 1e-6  # curvature times the root of the area, below which it is rounding
 _EXCESS = 0.15  # of E over C, where K is negative
 
 
@@ -60,9 +61,14 @@ def _ratio(share: Floats) -> Floats:
 
 
 def _integrals(frames: FaceFrames, directions: Directions) -> tuple[Floats, Floats]:
-    """Integrals of the sizes of the larger and of the smaller curvature (with signs) over negative K, or over all."""
+    """Integrals of the sizes of the larger and of the smaller curvature (with signs) over negative K, or over all.
+
+    What is flat but for rounding has none.
+    """
     difference = np.abs(directions.values)
     larger, smaller = directions.means + difference, directions.means - difference
+    bends = np.abs(larger) + np.abs(smaller) > _FLATTEST / np.sqrt(frames.areas.sum())
+    larger, smaller = np.where(bends, larger, 0.0), np.where(bends, smaller, 0.0)
     saddle = larger * smaller < 0
     where = frames.areas * (saddle if saddle.any() else True)
     return np.asarray(where @ np.abs(larger)), np.asarray(where @ np.abs(smaller))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,11 @@ import torch
 
 from .._graph import count_components, edge_numbers
 from ..errors import MeshError
-from ..fields.frames import Ints
+from ..fields.frames import Floats, Ints
 from ..topology import Topology
 from .creases import Creases
+
+_SHARPEST = math.radians(0.5)  # corner of a face
 
 
 class Shape(NamedTuple):
@@ -47,6 +50,24 @@ def verified_topology(faces: list[list[int]], num_vertices: int, wanted: Shape) 
     if wrong:
         raise MeshError("the mesh would have " + ", ".join(wrong))
     return topology
+
+
+def verify_corners(positions: Floats, faces: list[list[int]]) -> None:
+    """Checks that no face (of vertices at (V, 3)) has a corner without an angle, as where two sides lie on each other.
+
+    Raises:
+        MeshError: if one has.
+    """
+    sharpest = min(_sharpest(positions[face]) for face in faces)
+    if not sharpest >= _SHARPEST:
+        raise MeshError(f"a face would have a corner of {math.degrees(sharpest):.2g} degrees")
+
+
+def _sharpest(corners: Floats) -> float:
+    ahead = np.roll(corners, -1, axis=0) - corners
+    back = -np.roll(ahead, 1, axis=0)
+    sines = np.linalg.norm(np.cross(ahead, back), axis=1)
+    return float(np.arctan2(sines, (ahead * back).sum(1)).min())
 
 
 def verify_creases(topology: Topology, edges: Ints, creases: Creases) -> None:
