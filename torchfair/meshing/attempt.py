@@ -45,7 +45,7 @@ class Plan:
         smoothing: length over which directions are smoothed.
         align: whether boundary runs and creases become lines.
         creases: whether they are kept.
-        even: whether rows follow crosses, whose directions change places nowhere: see :func:`even_crosses`.
+        even: where positive, rows follow crosses, see :func:`even_crosses`: the weight of lengths in it.
         apart: (n, 3) places near which creases do not become lines.
     """
 
@@ -53,7 +53,7 @@ class Plan:
     smoothing: float
     align: bool
     creases: bool = True
-    even: bool = False
+    even: float = 0.0
     apart: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
@@ -177,7 +177,11 @@ def _untangled(problem: MapProblem) -> SeamlessMap:
     """The first map that is one to one near every point, or the last that was tried; a hopeless one as it is."""
     candidates = problem.candidates()
     found = candidates[0]
+    tried: list[SeamlessMap] = []
     for candidate in [] if is_hopeless(found) else candidates[:_UNTANGLED]:
+        if any(np.array_equal(candidate.flips, other.flips) for other in tried):
+            continue  # whole numbers far from what is turned over change nothing there
+        tried.append(candidate)
         found = untangled(problem, candidate)
         if found.is_sound or badness(found)[0] > _NEARLY:
             break

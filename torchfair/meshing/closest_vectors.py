@@ -107,8 +107,10 @@ def reduced_basis(metric: Floats) -> Ints:
         subtract(k, k - 1)
         share = shares[k, k - 1]
         if squares[k] >= (_LOVASZ - share**2) * squares[k - 1]:
-            for j in range(k - 2, -1, -1):
-                subtract(k, j)
+            last = k - 1
+            while (far := np.flatnonzero(np.abs(shares[k, :last]) > 0.5)).size:
+                last = int(far[-1])
+                subtract(k, last)
             k += 1
             continue
         total = squares[k] + share**2 * squares[k - 1]

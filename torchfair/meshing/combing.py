@@ -36,7 +36,7 @@ def combed(
     creases: Creases | None = None,
     angle: float = 0.0,
     *,
-    even: bool = False,
+    even: float = 0.0,
 ) -> CutGraph:
     """The mesh cut open, with a field of directions.
 
@@ -53,7 +53,7 @@ def combed(
         merging: singular vertices that are closer are merged, but for corners of creases.
         creases: of the surface.
         angle: between chains of creases and the field, up to which it follows them.
-        even: whether crosses are made to do, where they do not: see :func:`even_crosses`.
+        even: where positive, crosses are made to do, where they do not: see :func:`even_crosses`.
 
     Raises:
         MeshError: if they do anyway, or cannot be made to.
@@ -65,7 +65,7 @@ def combed(
         matched = matchings(frames, angles, 4)
         angles, matched = merge_singularities(frames, angles, matched, directions, smoothing, merging, 4, stay)
         before = matched
-        angles, matched = even_crosses(frames, angles, matched, directions, smoothing, stay)
+        angles, matched = even_crosses(frames, angles, matched, directions, smoothing, even, stay)
         graph = cut_open(frames, angles, matched, vertex_charges(frames, angles, matched))
         if matched is before or (graph.quarters % 2).any():
             raise MeshError("crosses have no odd index that can be joined with another")

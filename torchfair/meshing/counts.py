@@ -34,7 +34,7 @@ def mesh_to_count(
 
     Directions that turn make lines diverge, so that cells are larger or smaller than the spacing says, and cells that
     the boundary clips are joined. Spacings that are not much smaller than the first are laid on the same triangles:
-    finer ones would have other counts. What comes nearest is taken; where that is off by more than 15 %, a note says so.
+    finer ones would have other counts. What comes nearest is taken; where it is off by more than 15 %, a note says so.
 
     Args:
         surface: with its directions.

@@ -11,11 +11,11 @@ Pair = tuple[int, int]
 
 
 def cut_cells(positions: Floats, faces: list[list[int]], rows: set[Pair]) -> list[list[int]]:
-    """Triangles of cells: whole ones are cut along the diagonal that leads forward, clipped ones so that
-    no angle is smaller than it has to be.
+    """Triangles of cells: whole ones are cut along the diagonal that leads forward.
 
-    A whole cell has two opposite sides on rows. Seen along a row, counterclockwise, its diagonal starts where a side on
-    a row starts, whichever of the two: half a turn brings the lattice to itself.
+    Clipped ones are cut so that no angle is smaller than it has to be. A whole cell has two opposite sides on rows.
+    Seen along a row, counterclockwise, its diagonal starts where a side on a row starts, whichever of the two: half a
+    turn brings the lattice to itself.
 
     Args:
         positions: (V, 3).

@@ -21,6 +21,7 @@ def even_crosses(
     matched: Ints,
     directions: Directions,
     smoothing: float,
+    weight: float,
     stay: Bools | None = None,
 ) -> tuple[Floats, Ints]:
     """Crosses with no more vertices of index 1/4 or -1/4: those are joined in pairs, by short paths.
@@ -37,6 +38,7 @@ def even_crosses(
         matched: (I,) quarter turns over edges.
         directions: principal directions.
         smoothing: as for the field.
+        weight: of the length of paths, beside that of the confidence of directions along them.
         stay: (V,) bool: vertices that take the index of both rather than another on the path. None by default.
 
     Returns:
@@ -48,8 +50,8 @@ def even_crosses(
     ends = [np.array([vertex]) for vertex in np.flatnonzero(charges % 2)] + loops
     if len(ends) < 2:
         return angles, matched
-    lengths, before = _shortest_paths(frames, ends)
     trust = _at_vertices(frames, directions.confidence)
+    lengths, before = _shortest_paths(frames, ends, weight + trust)
     rank = trust if stay is None else np.where(stay, -1.0, trust)
     steps: list[tuple[int, int, int]] = []
     touched = np.zeros(len(frames.points), bool)
@@ -89,13 +91,14 @@ def closest_pairs(lengths: Floats) -> list[tuple[int, int]]:
     return pairs
 
 
-def _shortest_paths(frames: FaceFrames, ends: list[Ints]) -> tuple[Floats, Ints]:
+def _shortest_paths(frames: FaceFrames, ends: list[Ints], weights: Floats) -> tuple[Floats, Ints]:
     """(n, V) lengths of the shortest paths from sets of vertices to all, and the vertex before each on them.
 
-    Along edges, but not those from boundary to boundary.
+    Along edges, but not those from boundary to boundary, with lengths weighted by (V,).
     """
     inner = ~frames.is_boundary[frames.edges].all(1)
     (v, w), lengths = frames.edges[inner].T, frames.lengths[inner]
+    lengths = lengths * weights[frames.edges[inner]].mean(1)
     graph = sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(len(frames.points),) * 2)
     found = [dijkstra(graph, indices=of, return_predecessors=True, min_only=True)[:2] for of in ends]
     return np.stack([of for of, _ in found]), np.stack([of for _, of in found])

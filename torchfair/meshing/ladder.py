@@ -22,7 +22,9 @@ from .lattice import Lattice
 from .surface import DesignSurface
 
 _SMOOTHER = (1.0, 4.0, 16.0, 64.0)  # times the smoothing length
-_ROWS = ((1.0, False), (4.0, False), (1.0, True), (4.0, True), (16.0, False), (64.0, False))  # and whether even crosses
+_ROWS = ((1.0, 0.0), (1.0, 0.3), (1.0, 10.0), (4.0, 0.0), (1.0, 0.3), (1.0, 10.0), (16.0, 0.0), (64.0, 0.0))
+"""The same for lattices with rows, and how crosses are made even; at first where the plan before failed by far."""
+
 _SHARE = 0.5  # of the time limit, for plans that keep creases
 _RETRIES = 2  # with creases not aligned where a map is turned over
 _SPACINGS = (1.0, 0.967, 1.037, 0.934, 1.08)  # counts up and down by 7 and 15 %
@@ -40,18 +42,30 @@ class NoMeshError(MeshError):
         self.vertex = vertex
 
 
+Kind = tuple[float, bool, bool, float]
+
+
 class Rung(NamedTuple):
-    """A plan, how in words it differs from what was asked for, and by which factors."""
+    """A plan, how in words it differs from what was asked for, and by which factors.
+
+    Attributes:
+        early: whether it is for surfaces on which the same without even crosses failed by far.
+    """
 
     plan: Plan
     words: str
     scale: float
     smoother: float
+    early: bool
 
     @property
-    def kind(self) -> tuple[float, bool, bool, bool]:
+    def kind(self) -> Kind:
         """What it has in common with plans of a spacing a little different."""
         return self.smoother, self.plan.align, self.plan.creases, self.plan.even
+
+    def is_worth_it(self, hopeless: set[Kind]) -> bool:
+        """Whether to try it when plans of some kinds failed by far."""
+        return self.kind not in hopeless and (not self.early or (*self.kind[:3], 0.0) in hopeless)
 
 
 def mesh_component(
@@ -102,7 +116,7 @@ def mesh_component(
         return find_creases(triangles.frames, triangles.sharp, settings.corner_angle, spacing)
 
     @cache
-    def graph(spacing: float, smoothing: float, kept: bool, even: bool) -> CutGraph:
+    def graph(spacing: float, smoothing: float, kept: bool, even: float) -> CutGraph:
         triangles, carried = finer(kept)
         merging, sharp, angle = settings.merging * spacing, creases(spacing, kept), settings.boundary_angle
         try:
@@ -110,13 +124,16 @@ def mesh_component(
         except MeshError as error:
             raise FailedAttemptError(str(error), hopeless=True) from None
 
-    hopeless: set[tuple[float, bool, bool, bool]] = set()
+    hopeless: set[Kind] = set()
+    done: set[tuple[float, Kind]] = set()
     for place, rung in _from(first, list(plans(spacing, smoothing, settings, creased, lattice.has_rows))):
         plan = rung.plan
         limit = settings.time_limit * (_SHARE if plan.creases else 1.0)
         late = time.process_time() - began > limit
-        if number and (not settings.fallback or late or rung.kind in hopeless):
+        again = (rung.scale, rung.kind) in done
+        if number and (not settings.fallback or late or again or not rung.is_worth_it(hopeless)):
             continue
+        done.add((rung.scale, rung.kind))
         for _ in range(1 + _RETRIES * (settings.fallback and plan.creases and plan.align)):
             number += 1
             try:
@@ -164,7 +181,7 @@ def plans(
         can_align = settings.align_boundary or kept
         curves = "boundary and creases" if kept else "boundary"
         for scale in _SPACINGS:
-            for smoother, even in _ROWS if rows else [(smoother, False) for smoother in _SMOOTHER]:
+            for number, (smoother, even) in enumerate(_ROWS if rows else [(of, 0.0) for of in _SMOOTHER]):
                 for align in (True, False) if can_align else (False,):
                     words = [
                         "creases not kept" if creased and not kept else "",
@@ -174,7 +191,7 @@ def plans(
                         f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces" if scale != 1 else "",
                     ]
                     plan = Plan(spacing * scale, spacing * smoothing * smoother, align, kept, even)
-                    yield Rung(plan, ", ".join(filter(None, words)), scale, smoother)
+                    yield Rung(plan, ", ".join(filter(None, words)), scale, smoother, even > 0 and number < 3)
 
 
 def _refusal(failure: FailedAttemptError, number: int) -> str:

@@ -1,4 +1,4 @@
-"""Vertices and triangles in an order that follows from their geometry, so that how they were numbered decides nothing."""
+"""Vertices and triangles in an order that follows from geometry, so that how they were numbered decides nothing."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def turned_by_geometry(points: Tensor, topology: Topology) -> Topology:
 
 
 def _across(triangles: Ints) -> Ints:
-    """(3F,) the side of the neighbour for every side, that after corner k of triangle f is 3 f + k; -1 at the boundary."""
+    """(3F,) every side seen from the neighbour, that after corner k of triangle f being 3 f + k; -1 at the boundary."""
     start, end = triangles.ravel(), np.roll(triangles, -1, 1).ravel()
     size = int(triangles.max()) + 1
     forward, backward = start * size + end, end * size + start

@@ -14,6 +14,6 @@ def area_vector(positions: Floats, face: list[int]) -> Floats:
         positions: (V, 3).
         face: vertices counterclockwise.
     """
-    x, y, z = (positions[face] - positions[face[0]]).T
-    a, b, c = np.roll(x, -1), np.roll(y, -1), np.roll(z, -1)
+    apart = positions[face] - positions[face[0]]
+    (x, y, z), (a, b, c) = apart[:-1].T, apart[1:].T  # the first is zero, and so is what it adds at the end
     return np.array([y @ c - z @ b, z @ a - x @ c, x @ b - y @ a]) / 2
