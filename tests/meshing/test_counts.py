@@ -9,8 +9,10 @@ import torch
 from creased_shapes import box
 
 from torchfair import Topology
+from torchfair.fields import Directions
 from torchfair.meshing import principal_quads
 from torchfair.meshing.counts import next_spacing
+from torchfair.meshing.surface import DesignSurface
 from torchfair.shapes import example_roof
 
 
@@ -62,3 +64,18 @@ def test_the_count_does_not_depend_on_numbering() -> None:
     assert again.report["spacing"] == pytest.approx(found.report["spacing"])
     assert abs(found.report["faces"] / 400 - 1) < 0.15
     assert torch.cdist(found.singular_points, again.singular_points).amin(1).max() < 0.1 * found.report["spacing"]
+
+
+def test_spacings_near_the_first_are_laid_on_the_same_triangles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counts jumped by two thirds where the next spacing was laid on triangles that were cut once more."""
+    asked: list[float] = []
+    cut_finer = DesignSurface.cut_finer
+
+    def recorded(surface: DesignSurface, directions: Directions, length: float) -> tuple[DesignSurface, Directions]:
+        asked.append(length)
+        return cut_finer(surface, directions, length)
+
+    monkeypatch.setattr(DesignSurface, "cut_finer", recorded)
+    principal_quads(*example_roof(), count=200)
+    assert len(asked) > 1
+    assert all(length == asked[0] or length < 0.8 * asked[0] for length in asked)

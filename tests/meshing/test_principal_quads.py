@@ -17,7 +17,7 @@ from torchfair.errors import SettingsError, ShapeError, TorchfairError
 from torchfair.geometry import ReferenceSurface, face_areas, face_normals
 from torchfair.meshing import MeshingSettings, NoMeshError, QuadMesh, principal_quads
 from torchfair.meshing.components import read_surface
-from torchfair.meshing.verification import shape_of, verified_topology
+from torchfair.meshing.verification import shape_of, verified_topology, verify_corners
 from torchfair.shapes import (
     Catenoid,
     Cylinder,
@@ -302,6 +302,15 @@ def test_verification_says_what_is_wrong() -> None:
         verified_topology([], 0, wanted)
     with pytest.raises(MeshError):
         verified_topology([*faces, faces[0]], topology.num_vertices, wanted)
+
+
+def test_verification_finds_corners_without_an_angle() -> None:
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]])
+    verify_corners(square, [[0, 1, 2, 3], [0, 1, 2]])
+    verify_corners(square, [[0, 1, 4, 2, 3]])  # straight on at the second
+    for flat in ([0, 1, 4], [0, 4, 1, 3]):
+        with pytest.raises(MeshError, match="corner of 0 degrees"):
+            verify_corners(square, [[0, 1, 2, 3], flat])
 
 
 def test_a_report_can_be_written(tmp_path: Path) -> None:

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 import torch
 from creased_shapes import box
+from helpers import random_rotation
 from meshing_tools import MonkeySaddle, ellipsoid, irregular, side_by_side
 
 from torchfair.formfinding import principal_symmetric
 from torchfair.meshing import MeshingSettings, TriangleMesh, principal_triangles
+from torchfair.meshing.components import read_surface
 from torchfair.meshing.cut_cells import cut_cells
+from torchfair.meshing.row_distances import EQUILATERAL, row_distance, rows_across
 from torchfair.meshing.verification import shape_of
 from torchfair.shapes import PrincipalParaboloid, Torus
 
@@ -134,3 +137,57 @@ def test_boxes_have_rows_lengthwise_and_keep_their_edges(lines: int) -> None:
     corners = vertices[(vertices * (1 - vertices) == 0).all(1)]
     assert (corners[:, None] == found.vertices).all(-1).any(1).all()
     assert not any("creases" in note for note in found.notes)
+
+
+def triangulations(polygon: list[int]) -> list[list[list[int]]]:
+    """All of a convex polygon, naively."""
+    if len(polygon) < 3:
+        return [[]]
+    return [
+        [*left, [polygon[0], polygon[k], polygon[-1]], *right]
+        for k in range(1, len(polygon) - 1)
+        for left in triangulations(polygon[: k + 1])
+        for right in triangulations(polygon[k:])
+    ]
+
+
+def smallest_angle(positions: np.ndarray, triangles: list[list[int]]) -> float:
+    corners = positions[np.array(triangles)]
+    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    cosines = (ahead * back).sum(2) / np.linalg.norm(ahead, axis=2) / np.linalg.norm(back, axis=2)
+    return float(np.arccos(np.clip(cosines, -1, 1)).min())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_clipped_cells_are_cut_with_the_largest_smallest_angle(seed: int) -> None:
+    around = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, 6))
+    positions = np.stack([np.cos(around), 0.5 * np.sin(around), 0 * around], axis=1)
+    best = max(smallest_angle(positions, of) for of in triangulations(list(range(6))))
+    assert len(triangulations(list(range(6)))) == 14
+    assert smallest_angle(positions, cut_cells(positions, [list(range(6))], set())) == pytest.approx(best)
+
+
+def test_nodes_on_a_straight_side_make_no_triangle_of_their_own() -> None:
+    """Rounding gives such a triangle an area of 1e-17: corners of 0.0 degrees came out on boxes."""
+    positions = np.array([[0.0, 0, 0], [0.1, 0.3, 0], [0.2, 0.6, 0], [0.3, 0.9, 0], [-1, 1, 0]])
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    for shift in range(5):
+        face = np.roll(np.arange(5), shift).tolist()
+        assert smallest_angle(positions @ turn, cut_cells(positions @ turn, [face], set())) > 0.1
+
+
+@pytest.mark.parametrize("count", [100, 300])
+@pytest.mark.parametrize("lines", [2, 13])
+def test_boxes_have_the_count_asked_for_and_no_corner_without_an_angle(lines: int, count: int) -> None:
+    vertices, topology = box(lines, (1.0, 0.8, 0.6))
+    found = principal_triangles(3 * vertices @ random_rotation(5).T + 1, topology, count=count)
+    assert abs(found.report["faces"] / count - 1) <= 0.15
+    assert found.report["smallest_angle_degrees"] > 1
+
+
+def test_rounding_is_no_curvature() -> None:
+    """Rows on a box were 0.96 or 1.28 spacings apart, by curvatures of 1e-15."""
+    vertices, topology = box(13, (1.0, 0.8, 0.6))
+    surface = read_surface(vertices @ random_rotation(2).T, topology, MeshingSettings())
+    assert row_distance(surface.frames, surface.directions) == EQUILATERAL
+    assert not rows_across(surface.frames, surface.directions)

@@ -19,24 +19,19 @@ def numbered_by_geometry(points: Tensor, triangles: Tensor) -> tuple[Tensor, Ten
 
     It is that of a walk over the triangles, breadth first and counterclockwise, from a side of one of them. Of all
     sides that one is taken whose start is farthest from the centroid; of several such by the other corners, the
-    lengths of sides, and at last by coordinates. Those decide only on surfaces with symmetries (and where pieces touch
-    in no more than a vertex, where to go on); elsewhere the order is that of all rigid motions and scales, too.
+    lengths of sides, and at last by coordinates. Those decide only on surfaces with symmetries; elsewhere the order is
+    the same after rigid motions and changes of scale, too.
 
     Args:
         points: (V, 3).
-        triangles: (F, 3), oriented alike; every vertex is in one.
+        triangles: (F, 3), oriented alike and joined by edges; every vertex is in one.
 
     Returns:
         The old numbers (V,) of vertices in the new order; triangles (F, 3) in the new order, of new numbers, each from
         the corner at which it was entered on.
     """
     corners = triangles.numpy()
-    across, keys = _across(corners), _keys(points.numpy(), corners)
-    seen = np.zeros(len(corners), bool)
-    walk: list[int] = []
-    while len(walk) < len(corners):
-        walk += _walked(_first(keys, np.flatnonzero(np.repeat(~seen, 3))), across.tolist(), seen)
-    sides = np.array(walk)
+    sides = np.array(_walked(_first(_keys(points.numpy(), corners)), _across(corners).tolist()))
     entered = corners[sides[:, None] // 3, (sides[:, None] + np.arange(3)) % 3]
     found, first = np.unique(entered, return_index=True)
     order = found[np.argsort(first)]
@@ -79,7 +74,8 @@ def _keys(points: Floats, triangles: Ints) -> list[Floats]:
     return [np.roll(of, -k, 1).ravel() / far.max() for of in seen for k in range(3)]
 
 
-def _first(keys: list[Floats], sides: Ints) -> int:
+def _first(keys: list[Floats]) -> int:
+    sides = np.arange(len(keys[0]))
     for key in keys:
         if len(sides) == 1:
             break
@@ -88,19 +84,15 @@ def _first(keys: list[Floats], sides: Ints) -> int:
     return int(sides[0])
 
 
-def _walked(start: int, across: list[int], seen: np.ndarray) -> list[int]:
-    """The sides by which triangles are entered, in order; they are marked."""
-    visited = set((np.flatnonzero(seen)).tolist())
-    visited.add(start // 3)
-    queue, walk = deque([start]), []
+def _walked(start: int, across: list[int]) -> list[int]:
+    """The sides by which triangles are entered, in order."""
+    visited, queue, walk = {start // 3}, deque([start]), []
     while queue:
         side = queue.popleft()
         walk.append(side)
-        first = side - side % 3
         for k in range(3):
-            other = across[first + (side % 3 + k) % 3]
+            other = across[side // 3 * 3 + (side + k) % 3]
             if other >= 0 and other // 3 not in visited:
                 visited.add(other // 3)
                 queue.append(other)
-    seen[np.array(walk) // 3] = True
     return walk

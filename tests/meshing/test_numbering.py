@@ -1,0 +1,120 @@
+"""The order of vertices and faces decides nothing."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import pytest
+import torch
+from creased_shapes import box
+from helpers import random_rotation
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from meshing_tools import ellipsoid, irregular, punched, side_by_side
+from torch import Tensor
+
+from torchfair import Topology
+from torchfair.meshing import principal_quads, principal_triangles
+from torchfair.meshing.numbering import numbered_by_geometry
+from torchfair.meshing.surface import components_of
+from torchfair.shapes import FreeFormPatch, PrincipalParaboloid, Torus, builtin_mesh, icosphere
+from torchfair.shapes import principal_quads as analytic_quads
+
+Mesh = tuple[Tensor, Topology]
+SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
+
+
+def shuffled(vertices: Tensor, topology: Topology, seed: int) -> Mesh:
+    """The same with other numbers of vertices and faces, and faces that start at other corners."""
+    chance = random.Random(seed)
+    order = chance.sample(range(len(vertices)), len(vertices))
+    number = {old: new for new, old in enumerate(order)}
+    faces = []
+    for _, corners in topology.faces_by_size.values():
+        for face in corners.tolist():
+            first = chance.randrange(len(face))
+            faces.append([number[vertex] for vertex in face[first:] + face[:first]])
+    chance.shuffle(faces)
+    return vertices[torch.tensor(order)], Topology.from_faces(faces, len(vertices))
+
+
+def sphere() -> Mesh:
+    ball = icosphere(2)
+    return ball.vertices, ball.topology
+
+
+SHAPES: dict[str, Callable[[], Mesh]] = {
+    "saddle": lambda: irregular(SADDLE, 120),
+    "torus": lambda: irregular(Torus(), 600),
+    "sphere": sphere,
+    "ellipsoid": lambda: ellipsoid(2),
+    "cube": lambda: box(2),
+    "box": lambda: box(4, (1.0, 0.8, 0.6)),
+}
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 10**6))
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_order_is_the_same_for_all_numberings(name: str, seed: int) -> None:
+    vertices, topology = SHAPES[name]()
+    order, triangles = numbered_by_geometry(vertices, topology.triangles)
+    assert order.sort().values.tolist() == list(range(len(vertices)))
+    given_ones = {tuple(sorted(map(tuple, vertices[face].tolist()))) for face in topology.triangles}
+    assert {tuple(sorted(map(tuple, vertices[order][face].tolist()))) for face in triangles} == given_ones
+    again, other = shuffled(vertices, topology, seed)
+    renumbered, as_before = numbered_by_geometry(again, other.triangles)
+    assert torch.equal(again[renumbered], vertices[order])
+    assert torch.equal(as_before, triangles)
+
+
+@pytest.mark.parametrize("name", ["saddle", "ellipsoid", "torus"])
+def test_without_symmetries_it_is_that_of_all_motions_and_scales(name: str) -> None:
+    vertices, topology = SHAPES[name]()
+    if name == "torus":  # its symmetries are broken by the triangles alone
+        vertices, topology = irregular(Torus(), 600, seed=3)
+    order, triangles = numbered_by_geometry(vertices, topology.triangles)
+    again, other = shuffled(vertices, topology, 5)
+    moved = 7 * again @ random_rotation(3).T + torch.tensor([3.0, -1.0, 20.0])
+    renumbered, as_before = numbered_by_geometry(moved, other.triangles)
+    if name == "ellipsoid":  # half a turn brings it to itself, with its triangles
+        assert torch.equal(as_before, triangles)
+    else:
+        assert torch.equal(again[renumbered], vertices[order])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_polygons_are_cut_alike(seed: int) -> None:
+    """Both diagonals of a rectangle leave triangles of the same area: the first corner decided."""
+    quads = analytic_quads(Torus(), 12, 8)
+    for vertices, topology in ((quads.vertices, quads.topology), builtin_mesh("hybrid_roof")):
+        (found,), (again,) = (components_of(*of) for of in ((vertices, topology), shuffled(vertices, topology, seed)))
+        assert torch.equal(found.vertices, again.vertices)
+        assert torch.equal(found.topology.triangles, again.topology.triangles)
+
+
+def test_components_keep_the_numbers_that_were_given() -> None:
+    vertices, topology = punched(*side_by_side(irregular(SADDLE, 120), ellipsoid(2)), 40)
+    for part in components_of(vertices, topology):
+        assert torch.equal(part.vertices, vertices[part.numbers])
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_quads_are_the_same_to_the_last_bit(seed: int) -> None:
+    """The hybrid roof had 92, 105, 93, 94 or 91 panels, as it was numbered."""
+    vertices, topology = builtin_mesh("hybrid_roof")
+    found = principal_quads(vertices, topology, count=100)
+    again = principal_quads(*shuffled(vertices, topology, seed), count=100)
+    assert torch.equal(again.vertices, found.vertices)
+    assert torch.equal(again.topology.edges, found.topology.edges)
+    assert torch.equal(again.singular_points, found.singular_points)
+    assert again.notes == found.notes
+
+
+def test_triangles_are_the_same_to_the_last_bit() -> None:
+    vertices, topology = irregular(FreeFormPatch(), 700)
+    found = principal_triangles(vertices, topology, count=300)
+    again = principal_triangles(*shuffled(vertices, topology, 1), count=300)
+    assert torch.equal(again.vertices, found.vertices)
+    assert torch.equal(again.principal.mask, found.principal.mask)
