@@ -16,10 +16,11 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.meshing import principal_quads, principal_triangles
-from torchfair.meshing.numbering import numbered_by_geometry
+from torchfair.meshing.numbering import numbered_by_geometry, triangles_by_geometry
 from torchfair.meshing.surface import components_of
 from torchfair.shapes import FreeFormPatch, PrincipalParaboloid, Torus, builtin_mesh, icosphere
 from torchfair.shapes import principal_quads as analytic_quads
+from torchfair.triangulation import triangulate
 
 Mesh = tuple[Tensor, Topology]
 SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
@@ -86,12 +87,28 @@ def test_without_symmetries_it_is_that_of_all_motions_and_scales(name: str) -> N
 
 @pytest.mark.parametrize("seed", range(3))
 def test_polygons_are_cut_alike(seed: int) -> None:
-    """Both diagonals of a rectangle leave triangles of the same area: the first corner decided."""
+    """Both diagonals of a parallelogram leave triangles of the same area: the first corner decided, or rounding."""
     quads = analytic_quads(Torus(), 12, 8)
     for vertices, topology in ((quads.vertices, quads.topology), builtin_mesh("hybrid_roof")):
         (found,), (again,) = (components_of(*of) for of in ((vertices, topology), shuffled(vertices, topology, seed)))
         assert torch.equal(found.vertices, again.vertices)
         assert torch.equal(found.topology.triangles, again.topology.triangles)
+    (moved,) = components_of(3 * vertices @ random_rotation(seed).T - 5, topology)
+    assert torch.equal(moved.topology.triangles, found.topology.triangles)
+    assert torch.equal(moved.numbers, found.numbers)
+
+
+def test_quads_are_cut_so_that_the_smaller_triangle_is_as_large_as_it_can_be() -> None:
+    points = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [1.5, 0.5, 0], [0, 1, 0], [1, 3, 0]], dtype=torch.float64)
+    for corners, diagonal in (([0, 1, 2, 3], {1, 3}), ([0, 1, 5, 4], {0, 5})):
+        for shift in range(4):
+            numbers = torch.tensor(corners[shift:] + corners[:shift])
+            topology = Topology.from_faces([[0, 1, 2, 3]])
+            cut = triangles_by_geometry(points[numbers], topology)
+            shared = set(numbers[cut[0]].tolist()) & set(numbers[cut[1]].tolist())
+            assert shared == diagonal
+            same = triangulate(points[numbers], topology).triangles
+            assert {frozenset(of) for of in cut.tolist()} == {frozenset(of) for of in same.tolist()}
 
 
 def test_components_keep_the_numbers_that_were_given() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 
 import numpy as np
 import torch
@@ -10,6 +11,7 @@ from torch import Tensor
 
 from ..fields.frames import Floats, Ints
 from ..topology import Topology
+from ..triangulation import triangulate
 
 _TIE = 1e-7  # of the size of the surface, below which lengths count as equal
 
@@ -40,16 +42,55 @@ def numbered_by_geometry(points: Tensor, triangles: Tensor) -> tuple[Tensor, Ten
     return torch.from_numpy(order), torch.from_numpy(number[entered])
 
 
-def turned_by_geometry(points: Tensor, topology: Topology) -> Topology:
-    """The faces from the corners with the largest coordinates on, so that where they start says nothing."""
-    _, rank = np.unique(points.numpy(), axis=0, return_inverse=True)
+def triangles_by_geometry(points: Tensor, topology: Topology) -> Tensor:
+    """Triangles (n, 3) of the faces of a mesh, the same wherever faces start and whatever is rounded.
+
+    Quads are cut as :func:`torchfair.triangulation.triangulate` cuts them, so that the smaller triangle is as large as
+    it can be. Where it is as large either way, as in parallelograms, the shorter diagonal decides, then that with an
+    end farther from the middle of the mesh, then coordinates.
+    """
+    whole = triangulate(points, _turned(points, topology))
+    others = whole.triangles[topology.face_sizes[whole.faces] != 4]
+    quads = topology.faces_by_size.get(4)
+    return others if quads is None else torch.cat([others, _cut_quads(points.numpy(), quads[1].numpy())])
+
+
+def _turned(points: Tensor, topology: Topology) -> Topology:
+    """The faces from the corners with the largest coordinates on."""
+    rank = np.unique(points.numpy(), axis=0, return_inverse=True)[1].reshape(-1)
     faces: list[list[int]] = [[]] * topology.num_faces
     for size, (numbers, corners) in topology.faces_by_size.items():
-        first = rank.reshape(-1)[corners.numpy()].argmax(1)
-        turned = np.take_along_axis(corners.numpy(), (first[:, None] + np.arange(size)) % size, 1)
+        first = rank[corners.numpy()].argmax(1)[:, None]
+        turned = np.take_along_axis(corners.numpy(), (first + np.arange(size)) % size, 1)
         for number, face in zip(numbers.tolist(), turned.tolist(), strict=True):
             faces[number] = face
     return Topology.from_faces(faces, topology.num_vertices)
+
+
+def _cut_quads(points: Floats, corners: Ints) -> Tensor:
+    middle = points.mean(0)
+    far = np.linalg.norm(points - middle, axis=1)
+    size = far.max()
+    fans = [np.roll(corners, -k, axis=1)[:, [[0, 1, 2], [0, 2, 3]]] for k in (0, 1)]
+    sides = [[*_signs(points, fan, size, far)] for fan in fans]
+    second, open_ = np.zeros(len(corners), bool), np.ones(len(corners), bool)
+    for one, other in zip(*sides, strict=True):
+        decides = open_ & (np.abs(other - one) > _TIE)
+        second[decides] = (other > one)[decides]
+        open_ &= ~decides
+    return torch.from_numpy(np.where(second[:, None, None], fans[1], fans[0]).reshape(-1, 3))
+
+
+def _signs(points: Floats, fan: Ints, size: float, far: Floats) -> Iterator[Floats]:
+    """(n,) each: what makes one way to cut quads better than the other, for both triangles of each (n, 2, 3)."""
+    a, b, c = points[fan].transpose(2, 0, 1, 3)
+    areas = np.cross(b - a, c - a)
+    whole = areas.sum(1, keepdims=True)
+    yield (areas * whole).sum(2).min(1) / np.maximum((whole**2).sum((1, 2)), 1e-300)
+    ends = fan[:, 0, [0, 2]]
+    yield -np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1) / size
+    yield far[ends].max(1) / size
+    yield from (points[ends].max(1) / size).T
 
 
 def _across(triangles: Ints) -> Ints:

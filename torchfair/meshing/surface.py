@@ -19,10 +19,9 @@ from ..fields.frames import Bools
 from ..geometry import FittedCurvature, degenerate_faces, dual_edge_lengths, edge_lengths, fitted_curvature
 from ..subdivision import midpoint
 from ..topology import Topology
-from ..triangulation import triangulate
 from .bridges import cut_bridges
 from .creases import sharp_edges
-from .numbering import numbered_by_geometry, turned_by_geometry
+from .numbering import numbered_by_geometry, triangles_by_geometry
 from .sizes import SizeField
 
 _COARSE = 1.0  # mean edge over the spacing above which triangles are cut
@@ -112,7 +111,7 @@ def components_of(vertices: Tensor, topology: Topology, crease_angle: float = 0.
     if flat:
         words = ". torchfair.repair_mesh (--repair) drops them; or remesh them."
         raise PlacedError(f"{len(flat)} face(s) have no area: faces ", few("face", flat), words)
-    triangles = triangulate(points, turned_by_geometry(points, topology)).triangles
+    triangles = triangles_by_geometry(points, topology)
     whole = Topology.from_faces(triangles, topology.num_vertices)
     labels = face_components(whole)
     parts = []
