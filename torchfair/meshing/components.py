@@ -26,6 +26,7 @@ from .lattice import Lattice
 from .mesh_creases import MeshCreases
 from .sizes import SizeField
 from .surface import DesignSurface, components_of
+from .surface_curvature import smooth_absolute_curvature
 from .verification import Shape, shape_of
 
 
@@ -82,14 +83,14 @@ class ReadSurface:
 
     @cached_property
     def total_absolute_curvature(self) -> float:
-        """C: the integral of both principal curvatures in size, by the fits at the vertices, and of creases ``l l*``.
+        """C of the smooth surface whose normals are those of the fits at the vertices, and of creases ``l l*``.
 
-        On smooth surfaces it is nearer to theirs than :class:`torchfair.energies.TotalAbsoluteCurvature` of the
+        It is nearer to that of smooth surfaces than :class:`torchfair.energies.TotalAbsoluteCurvature` of the
         triangles, which misses half of the stars at the boundary, and takes noise for curvature.
         """
-        bends = torch.cat([of.curvatures for of in self.fits]).abs().sum(-1)
         smooth = self.smooth_frames
-        inside = smooth.areas @ bends.numpy()[smooth.triangles].mean(1)
+        normals = torch.cat([of.normals for of in self.fits])
+        inside = smooth_absolute_curvature(torch.from_numpy(smooth.points), smooth.topology, normals)
         return float(inside) + sum(part.crease_variation for part in self.parts)
 
     def sized(self, sizes: SizeField) -> list[DesignSurface]:

@@ -52,6 +52,7 @@ def planar_terms(problem: FairProblem, share: float) -> list[ElementTerm]:
         *problem.pulls.terms(weight=settings.handle_weight),
         *panels.planar_terms(share),
         *panels.flat_terms(share),
+        *_directions(problem),
     ]
 
 
