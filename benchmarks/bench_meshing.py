@@ -1,11 +1,12 @@
-"""Principal quads: time and memory up to 100 000 quads, and angles, E/C and time beside QuadriFlow and Instant Meshes.
+"""Principal meshes: time and memory up to 100 000 faces, and angles, E/C and time beside QuadriFlow and Instant Meshes.
 
-Run ``python benchmarks/bench_meshing.py [--sizes 700:7000 ...] [--quads 700] [--surfaces NAME ...] [--json FILE]``, on
-one thread; times are processor seconds.
+Run ``python benchmarks/bench_meshing.py [--sizes 700:7000 ...] [--shapes torus ...] [--kinds quads ...] [--quads 700]
+[--surfaces NAME ...] [--json FILE]``, on one thread; times are processor seconds.
 
 =========  ==============================================================================================
-sizes      quads asked for and triangles of the surface, a free-form patch; every size in its own process, whose
-           largest memory is printed (targets: 2, 3 and 15 s for the first three; 4 GB; growth at most 1.3)
+sizes      faces asked for and triangles of the surface, a free-form patch and a torus, quads and triangles; every size
+           in its own process, whose largest memory is printed (targets: 2, 3 and 15 s for the first three; 4 GB;
+           growth at most 1.3)
 surfaces   irregular triangles of analytic surfaces, and files beside the project if there are any; all sides get
            the same triangles and the same count, one after the other
 angle      degrees between inner edges and principal directions, mean and 95 %; none where edges are so short that
@@ -37,7 +38,7 @@ from torch import Tensor
 from torchfair import Topology, TorchfairError
 from torchfair.geometry import edge_lengths
 from torchfair.io import load_mesh
-from torchfair.meshing import MeshCreases, MeshingSettings, principal_quads
+from torchfair.meshing import MeshCreases, MeshingSettings, principal_quads, principal_triangles
 from torchfair.meshing.components import ReadSurface, read_surface
 from torchfair.meshing.report import measure
 from torchfair.meshing.verification import shape_of
@@ -54,9 +55,10 @@ from torchfair.triangulation import triangulate
 
 Mesh = tuple[Tensor, Topology]
 OURS = "torchfair"
-SIZES = ((700, 7000), (2000, 7000), (20_000, 29_000), (100_000, 145_000))
+SIZES = ((700, 7000), (2000, 7000), (20_000, 29_000), (50_000, 72_000), (100_000, 145_000))
 TIMES = {(700, 7000): 2.0, (2000, 7000): 3.0, (20_000, 29_000): 15.0}
 MEMORY, GROWTH, SLOWER = 4.0, 1.3, 3.0
+SHAPES, KINDS = ("free-form patch", "torus"), ("quads", "triangles")
 ANALYTIC = {
     "saddle": PrincipalParaboloid(1.0, -0.5),
     "torus": Torus(),
@@ -94,14 +96,15 @@ def available() -> list[str]:
 # ---- growth --------------------------------------------------------------------------------------------
 
 
-def child(quads: int, triangles: int) -> None:
+def child(shape: str, kind: str, count: int, triangles: int) -> None:
     """Meshes one size after a small one and prints JSON."""
-    lines = round(math.sqrt(triangles / 2))
-    surface = rotated_lattice(FreeFormPatch(), lines, lines, 0.4, kind="triangles")
-    small = rotated_lattice(FreeFormPatch(), 12, 12, 0.4, kind="triangles")
-    principal_quads(small.vertices, small.topology, count=60)
+    lines, smooth = round(math.sqrt(triangles / 2)), ANALYTIC[shape]
+    make = principal_quads if kind == "quads" else principal_triangles
+    surface = rotated_lattice(smooth, lines, lines, 0.4, kind="triangles")
+    small = rotated_lattice(smooth, 12, 12, 0.4, kind="triangles")
+    make(small.vertices, small.topology, count=60)
     begin = time.process_time()
-    made = principal_quads(surface.vertices, surface.topology, count=quads)
+    made = make(surface.vertices, surface.topology, count=count)
     seconds = time.process_time() - begin
     unit = 1.0 if sys.platform == "darwin" else 1024.0  # bytes there, kibibytes elsewhere
     gigabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
@@ -109,17 +112,18 @@ def child(quads: int, triangles: int) -> None:
     print(json.dumps({**row, "memory": gigabytes, "angle": made.report["angle_mean_degrees"], "notes": made.notes}))
 
 
-def growth(sizes: list[tuple[int, int]]) -> list[dict[str, Any]]:
+def growth(shape: str, kind: str, sizes: list[tuple[int, int]]) -> list[dict[str, Any]]:
     """One line for every size, and the exponent."""
+    print(f"{shape}, {kind}")
     print(f"{'asked for':>10}{'faces':>9}{'triangles':>11}{'seconds':>9}{'memory':>9}{'angle':>7}  target")
     rows = []
-    for quads, triangles in sizes:
-        command = [sys.executable, __file__, "--child", f"{quads}:{triangles}"]
+    for count, triangles in sizes:
+        command = [sys.executable, __file__, "--child", shape, kind, str(count), str(triangles)]
         row = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-        rows.append({"asked": quads, **row})
-        limit = TIMES.get((quads, triangles))
+        rows.append({"asked": count, **row})
+        limit = TIMES.get((count, triangles))
         met = "" if limit is None else f"{limit:.0f} s: {verdict(row['seconds'] <= limit)}"
-        print(f"{quads:>10}{row['faces']:>9}{row['triangles']:>11}{row['seconds']:9.2f}{row['memory']:6.2f} GB", end="")
+        print(f"{count:>10}{row['faces']:>9}{row['triangles']:>11}{row['seconds']:9.2f}{row['memory']:6.2f} GB", end="")
         angle = f"{row['angle']:7.2f}" if row["angle"] is not None else f"{'-':>7}"
         print(f"{angle}  {met}{''.join(f'  ({note})' for note in row['notes'])}", flush=True)
     if len(rows) > 1:
@@ -232,16 +236,20 @@ def pair(text: str) -> tuple[int, int]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", type=pair, nargs="*", default=list(SIZES), help="none: left out")
+    parser.add_argument("--shapes", choices=ANALYTIC, nargs="*", default=list(SHAPES), help="of the sizes")
+    parser.add_argument("--kinds", choices=KINDS, nargs="*", default=list(KINDS), help="of the sizes")
     parser.add_argument("--quads", type=int, default=700, help="for the comparison")
     parser.add_argument("--surfaces", nargs="*", default=available(), help="none: left out")
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--child", type=pair, help=argparse.SUPPRESS)
+    parser.add_argument("--child", nargs=4, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     if arguments.child:
-        return child(*arguments.child)
+        shape, kind, count, triangles = arguments.child
+        return child(shape, kind, int(count), int(triangles))
+    both = [(shape, kind) for shape in arguments.shapes for kind in arguments.kinds]
     result = {
-        "sizes": growth(arguments.sizes) if arguments.sizes else [],
+        "sizes": {f"{shape}, {kind}": growth(shape, kind, arguments.sizes) for shape, kind in both if arguments.sizes},
         "surfaces": compare(arguments.surfaces, arguments.quads) if arguments.surfaces else {},
     }
     if arguments.json:

@@ -7,7 +7,8 @@ surfaces  analytic ones as irregular triangles, others that are made here, and t
 count     700 faces of surfaces with 3000 triangles, else 300; a name with ``:N`` at its end asks for N
 process   every mesh in a process of its own, on one thread, that ends after 60 s of processor time
 broken    a mesh that is returned is checked here: Euler number, loops, components, and no face that is turned over
-planar    quads, then ``planar_quads``: largest planarity (target 1e-4) and distance in edges (target 0.03)
+planar    quads, then ``planar_quads``: largest planarity (target 1e-4), distance of vertices from the surface in edges
+          (target 0.03, or as far as they were before), and mean angles before and after (target: 1 degree more)
 ========  ===============================================================================================
 """
 
@@ -38,6 +39,8 @@ from torchfair.triangulation import triangulate
 
 KINDS = ("quads", "triangles", "planar")
 LIMIT = 60
+RATIO = "variation_over_curvature"
+PLANAR, AWAY, TURNED = 1e-4, 0.03, 1.0  # planarity, distance in edges, degrees
 _MANY = 3000  # triangles
 _FOLDED = 0.01  # of the faces may look the other way than the surface next to them, at sharp edges
 
@@ -121,11 +124,13 @@ def made(surface: Mesh, kind: str, count: int) -> dict[str, Any]:
     if kind == "planar":
         mesh, job = planar_quads(quads, surface)
         row = {"planarity": mesh.report["planarity_max"], "missed": [str(of) for of in job.promises if not of.holds]}
+        row |= {"angle_before": quads.report["angle_mean_degrees"], "ratio_before": quads.report[RATIO]}
+        row |= {"away": job.after["largest_distance_relative"], "away_before": job.before["largest_distance_relative"]}
     report = mesh.report
     row |= {
         "faces": report["faces"],
         "angle": report["angle_mean_degrees"],
-        "ratio": report["variation_over_curvature"],
+        "ratio": report[RATIO],
     }
     row |= {"distance": report["distance_max"], "singular": report["singular"], "notes": mesh.notes}
     return row | {"fault": fault(mesh.vertices, mesh.topology, surface)}
@@ -170,8 +175,22 @@ def line(row: dict[str, Any]) -> str:
         return f"{words}  {row.get('why', '')}"
     angle, ratio = (f"{row[name]:7.2f}" if row[name] is not None else f"{'-':>7}" for name in ("angle", "ratio"))
     words += f"  {row['faces']:5} of {row['asked']:4}  angle {angle}  E/C {ratio}  distance {row['distance']:.3f}"
-    words += f"  planarity {row['planarity']:.1e}" if "planarity" in row else ""
+    if "planarity" in row:
+        words += f"  planarity {row['planarity']:.1e}  vertices {row['away']:.3f} away  turned {turned(row):.2f}"
     return "  ".join([words, *filter(None, [row["fault"]]), *row.get("missed", []), *row["notes"]])
+
+
+def turned(row: dict[str, Any]) -> float:
+    """Degrees by which planar faces have turned edges away from directions; 0 where there are none."""
+    before, after = row["angle_before"], row["angle"]
+    return 0.0 if before is None or after is None else float(after - before)
+
+
+def short_of(row: dict[str, Any]) -> list[str]:
+    """The targets of planar quads that a mesh misses."""
+    far = row["away"] > 1.0001 * max(AWAY, row["away_before"])
+    missed = {"planarity": row["planarity"] > PLANAR, "distance": far, "angle": turned(row) > TURNED}
+    return [name for name, is_missed in missed.items() if is_missed]
 
 
 def main() -> None:
@@ -189,6 +208,9 @@ def main() -> None:
             print(f"{kind:<10}{asked:<26}{line(row)}", flush=True)
         ends = Counter(row["end"] for row in table[kind].values())
         print(f"{kind}: {len(table[kind])} surfaces, " + ", ".join(f"{count} {end}" for end, count in ends.items()))
+        missed = {name: short_of(row) for name, row in table[kind].items() if "planarity" in row and short_of(row)}
+        if kind == "planar":
+            print(f"planar: targets missed by {missed or 'none'}")
         if arguments.json:
             arguments.json.write_text(json.dumps(table, indent=1) + "\n")
 

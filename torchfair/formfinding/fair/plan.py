@@ -15,6 +15,7 @@ from .problem import FairProblem
 _SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
 _LARGEST_SHARE = 1.3
 _WEAK = 1.0 / 3.0
+_LITTLE_MORE = 1.02  # times E of the start: what planar faces cost on a mesh that had hardly more than the least
 _WORTHWHILE = 0.1  # of the largest deviation from planarity at the start: less is better than nothing
 _PLANAR_SHARES = (1.0 / 3.0, 2.0 / 3.0, 1.0, 7.0 / 6.0, 8.0 / 6.0)  # that make faces planar without E
 
@@ -47,10 +48,11 @@ class FairPlan(Plan):
         self._problem = problem
 
     def stages(self) -> Stages:
-        """All portions; where that leaves faces warped or has to raise E, faces are made planar first, E lowered then.
+        """All portions; where that leaves faces warped or raises E much, faces are made planar first, E lowered then.
 
-        Where neither helps, they are made planar from where the planes of faces meet. The best is kept. Where none has
-        planar faces, the start is, with E lowered as far as no face is warped more than the worst one was.
+        Where neither helps, they are made planar from where the planes of faces meet. The best is kept, of those within
+        the distance limit if there are any. Where none has planar faces, the start is, with E lowered as far as no face
+        is warped more than the worst one was.
         """
         problem, start = self._problem, self.state["vertices"]
         every = problem.settings.projection.takes_every_step
@@ -60,18 +62,19 @@ class FairPlan(Plan):
             return
         energy, warp = problem.energy(start), problem.largest_warp(start)
         first = self.state["vertices"]
-        if problem.largest_warp(first) <= PLANAR_PROMISE and problem.energy(first) <= energy:
+        near_enough = problem.is_planar_within_limits(first)
+        if near_enough and problem.energy(first) <= _LITTLE_MORE * energy:
             return
-        yield from self._made_planar(start)
+        yield from self._made_planar(start, 0.0 if near_enough else problem.settings.planar_distance)
         found = [first, self.state["vertices"]]
         planar = [vertices for vertices in found if problem.largest_warp(vertices) <= PLANAR_PROMISE]
         meeting = None if planar else problem.where_planes_meet(start)
         if meeting is not None:
-            yield from self._made_planar(meeting)
+            yield from self._made_planar(meeting, problem.settings.planar_distance)
             found.append(self.state["vertices"])
             planar = [found[-1]] if problem.largest_warp(found[-1]) <= PLANAR_PROMISE else []
         if planar:
-            best = min(planar, key=problem.energy)
+            best = min(planar, key=lambda found: (not problem.is_planar_within_limits(found), problem.energy(found)))
         else:
             best = min(found, key=problem.largest_warp)
             if problem.largest_warp(best) > _WORTHWHILE * warp:
@@ -93,10 +96,10 @@ class FairPlan(Plan):
             if not portions and share < most and not problem.panels.are_planar(problem.placed(self.state)):
                 portions.append(Portion(share + _SHARE_STEP, 1.0))
 
-    def _made_planar(self, start: Tensor) -> Stages:
-        """Makes faces planar near the start, as far away as that takes, and lowers E from there."""
+    def _made_planar(self, start: Tensor, most: float) -> Stages:
+        """Makes faces planar near the start, as far away as that takes and at most so far, and lowers E from there."""
         problem = self._problem
-        problem.near.lift(start, problem.settings.planar_distance)
+        problem.near.lift(start, most)
         problem.has_other_goals = True
         problem.pulls.aim(1.0, start)
         self.state = problem.blocks(start)

@@ -25,7 +25,7 @@ from .free_boundary import FreeBoundary
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
-from .panels import Panels
+from .panels import PLANAR_PROMISE, Panels
 from .terms import fair_terms, planar_terms
 
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
@@ -183,6 +183,13 @@ class FairProblem:
         """Largest relative planarity of the faces kept planar, with gliding ``vertices`` (V, 3) put in place."""
         warped = self.panels.warps(self.placed({"vertices": vertices}))
         return float(warped.max()) if warped.numel() else 0.0
+
+    def is_planar_within_limits(self, vertices: Tensor) -> bool:
+        """Whether the faces of ``vertices`` (V, 3) are planar as promised, within the limits of the start."""
+        limits = self.near.limits
+        if self.largest_warp(vertices) > PLANAR_PROMISE:
+            return False
+        return limits is None or not bool((self.near.distances(self.placed({"vertices": vertices})) > limits).any())
 
     def where_planes_meet(self, vertices: Tensor) -> Tensor | None:
         """A start (V, 3) nearer to planar faces, far off within the tangent planes; None if it breaks bounds."""

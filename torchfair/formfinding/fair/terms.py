@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .problem import FairProblem
 
 _NEAR = 1.0  # weight of closeness while faces become planar
+_LOOSER = 0.01  # of the weight of directions meanwhile, so that faces do not leave the surface for them
 
 
 def fair_terms(problem: FairProblem, share: float, blur: float = 1.0) -> list[ElementTerm]:
@@ -52,7 +53,7 @@ def planar_terms(problem: FairProblem, share: float) -> list[ElementTerm]:
         *problem.pulls.terms(weight=settings.handle_weight),
         *panels.planar_terms(share),
         *panels.flat_terms(share),
-        *_directions(problem),
+        *_directions(problem, _LOOSER),
     ]
 
 
@@ -72,11 +73,11 @@ def _energy(problem: FairProblem, blur: float) -> list[ElementTerm]:
     )
 
 
-def _directions(problem: FairProblem) -> list[ElementTerm]:
+def _directions(problem: FairProblem, share: float = 1.0) -> list[ElementTerm]:
     if problem.settings.directions == "free":
         return []
     every = torch.arange(problem.topology.num_interior_edges)
-    weight = problem.settings.direction_weight
+    weight = share * problem.settings.direction_weight
     return c.edge_direction_terms(problem.vertices, problem.topology, every, weight=weight)
 
 
