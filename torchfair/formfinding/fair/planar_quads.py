@@ -20,9 +20,17 @@ if TYPE_CHECKING:
     _Solved = tuple[JobResult[Level], dict[str, Any]]
 
 PLANAR_QUADS = FairSettings(
-    planar="quads", distance_limit=0.03, directions="keep", direction_weight=300.0, energy_weight=10.0
+    planar="quads",
+    distance_limit=0.03,
+    directions="keep",
+    direction_weight=300.0,
+    energy_weight=10.0,
+    largest_area=1.5,
 )
-"""Planar polygons at most 3 % of a mean edge from the surface, with edges that keep their directions."""
+"""Planar polygons at most 3 % of a mean edge from the surface, with edges that keep their directions.
+
+Panels grow by half at most: since edges of the boundary have no E, panels there would grow threefold.
+"""
 
 _TURNED = 1.0  # degrees in the mean, beyond which edges turn too far
 _GENTLER = replace(PLANAR_QUADS, energy_weight=1.0)
