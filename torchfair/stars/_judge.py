@@ -23,7 +23,7 @@ from ..geometry._ops import cross, dot
 from ._cones import interior_directions
 from ._groups import sector_normals, turns_once
 from ._patterns import count_changes, crossed_sectors, fill_zeros, four_run_patterns, uneven
-from ._planes import patterns_of_planes
+from ._planes import patterns_of_planes, planes_may_show
 
 CONVEX, SADDLE, NEITHER = 0, 1, 2
 ALL_PATTERNS = 8
@@ -146,14 +146,15 @@ def _best_plane(arms: Tensor, sectors: Tensor, signs: Tensor, noise: Tensor) -> 
 
 
 def _candidates(arms: Tensor, sectors: Tensor, signs: Tensor) -> tuple[Tensor, Tensor]:
-    """Star numbers (p,) and patterns of sides (p, k) that are not excluded by the signs of the edges."""
+    """Star numbers (p,) and patterns of sides (p, k), excluded neither by all planes nor by the signs of the edges."""
     valence = arms.shape[1]
     if valence > ALL_PATTERNS:
         stars, sides = patterns_of_planes(arms)
     else:
-        table = four_run_patterns(valence).signs.to(arms.device, torch.int8)
-        stars = torch.arange(arms.shape[0], device=arms.device).repeat_interleave(table.shape[0])
-        sides = table.repeat(arms.shape[0], 1)
+        table = four_run_patterns(valence).signs
+        shown = planes_may_show(arms, table[::2]).repeat_interleave(2, dim=1)  # opposite patterns stand side by side
+        stars, numbers = shown.nonzero().unbind(1)
+        sides = table.to(arms.device, torch.int8)[numbers]
     kept = _each_run_bends(sides, signs[stars])
     return stars[kept], sides[kept]
 
