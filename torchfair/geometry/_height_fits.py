@@ -57,6 +57,41 @@ def _shares(degree: int) -> list[float]:
     return [1.0 / math.comb(order, k) for order, k in _terms(degree)]
 
 
+def fitted_normals(vertices: Tensor, normals: Tensor, patches: Patches) -> Tensor:
+    """Unit normals (*batch, V, 3), in double precision, of quadratics over the planes orthogonal to ``normals``.
+
+    Members count as in :func:`fitted_heights`. Zero where ``normals`` (*batch, V, 3) are.
+    """
+    frames, least = _frames(normals), _least(2, normals.device)
+    slopes = []
+    for group in patches.groups:
+        weights, _, rows = _members(vertices, normals, frames, group, 2)
+        shares = weights / _total(weights)
+        terms, right, _ = _parted((rows @ shares[..., None]).squeeze(-1), 2)
+        matrix = _of_pairs(terms, right.shape[-1]) + least
+        slopes.append(torch.linalg.solve_ex(matrix, right).result[..., 1:3])
+    return turned_normals(frames, patches.in_order(slopes))
+
+
+def turned_normals(frames: Tensor, slopes: Tensor) -> Tensor:
+    """Unit normals (..., 3) of planes with ``slopes`` (..., 2) over the tangents of ``frames`` (..., 3, 3)."""
+    first, second, normal = frames.unbind(-2)
+    stretch = (1.0 + slopes.square().sum(-1, keepdim=True)).sqrt()
+    return (normal - slopes[..., :1] * first - slopes[..., 1:] * second) / stretch
+
+
+def _frames(normals: Tensor) -> Tensor:
+    """(*batch, V, 3, 3) two tangents and the normal."""
+    return torch.cat([tangent_bases(normals), normals[..., None, :]], dim=-2).double()
+
+
+def _least(degree: int, device: torch.device) -> Tensor:
+    """(p, p) what is added to matrices, so that what the members leave open is zero."""
+    shares = zip(_terms(degree), _shares(degree), strict=True)
+    ridge = [_RIDGE * 100.0**order * share for (order, _), share in shares]
+    return torch.diag(torch.tensor(ridge, dtype=torch.float64, device=device))
+
+
 def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: int) -> Heights:
     """Polynomials of least squares over the planes orthogonal to ``normals`` (*batch, V, 3), in double precision.
 
@@ -66,26 +101,21 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     Terms above the second order are believed as far as they stand out of the noise: their coefficients are taken to
     be spread about zero as widely as they are found to be in the patches around, less what noise alone makes of them
     (empirical Bayes). Without noise that is the plain fit; in noise it is a quadratic one, with as much of a slope of
-    the curvatures as can be told.
+    the curvatures as can be told. ``degree`` is 3 or more.
     """
-    frames = torch.cat([tangent_bases(normals), normals[..., None, :]], dim=-2).double()
-    ridge = [_RIDGE * 100.0**order * share for (order, _), share in zip(_terms(degree), _shares(degree), strict=True)]
-    least = torch.diag(frames.new_tensor(ridge))
+    frames, least = _frames(normals), _least(degree, normals.device)
     # Matrices of all vertices would take kilobytes for each, so they are made for one group of patches at a time, and
     # made again where they are needed once more: of what they are made of, as far as that was kept.
     kept: dict[int, _Moments] = {}
     fits, room = [], _KEPT
     for number, group in enumerate(patches.groups):
         moments = _moments(vertices, normals, frames, group, degree)
-        fits.append(_plain_fit(moments, least, with_covariance=degree <= 2))
+        fits.append(_plain_fit(moments, least))
         room -= sum(part.numel() for part in moments)
-        if degree > 2 and room >= 0:
+        if room >= 0:
             kept[number] = moments
     coefficients, spread, variance = (patches.in_order([fit[i] for fit in fits]) for i in range(3))
     scale = patches.in_order([fit.scale for fit in fits]).squeeze(-1)
-    if degree <= 2:
-        covariance = patches.in_order([fit.covariance for fit in fits])
-        return Heights(frames, scale, coefficients, covariance.view(*scale.shape, *least.shape))
     fits.clear()
     variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
     believed = []
@@ -106,10 +136,9 @@ class _Fit(NamedTuple):
     spread: Tensor  # variances of the coefficients per variance of the noise
     variance: Tensor  # of the noise
     scale: Tensor
-    covariance: Tensor  # flat; empty unless asked for
 
 
-def _plain_fit(moments: _Moments, least: Tensor, *, with_covariance: bool) -> _Fit:
+def _plain_fit(moments: _Moments, least: Tensor) -> _Fit:
     matrix = moments.matrix
     inverse = torch.linalg.inv_ex(matrix + least).inverse
     coefficients = (inverse @ moments.right[..., None]).squeeze(-1)
@@ -117,10 +146,7 @@ def _plain_fit(moments: _Moments, least: Tensor, *, with_covariance: bool) -> _F
     variance = _variance(moments, coefficients, matrix, (inverse * twice_weighted).sum((-2, -1)))
     noisy = twice_weighted + least  # noise enters the right side with the weights, so their squares are here
     spread = (inverse @ noisy * inverse).sum(-1) / moments.weight[..., None]
-    covariance = coefficients[..., :0]
-    if with_covariance:
-        covariance = (inverse @ noisy @ inverse * (variance / moments.weight)[..., None, None]).flatten(-2)
-    return _Fit(coefficients, spread, variance[..., None], moments.scale[..., None], covariance)
+    return _Fit(coefficients, spread, variance[..., None], moments.scale[..., None])
 
 
 def _believed_fit(moments: _Moments, least: Tensor, doubts: Tensor, variance: Tensor) -> tuple[Tensor, Tensor]:
@@ -160,33 +186,53 @@ def _of_pairs(terms: Tensor, size: int) -> Tensor:
 
 
 def _moments(vertices: Tensor, normals: Tensor, frames: Tensor, group: PatchGroup, degree: int) -> _Moments:
+    weights, scale, rows = _members(vertices, normals, frames, group, degree)
+    total = _total(weights)
+    shares = weights / total
+    sums, squared = (rows @ torch.stack([shares, shares * weights], dim=-1)).unbind(-1)
+    terms, right, square = _parted(sums, degree)
+    return _Moments(
+        terms.clone(), squared[..., : terms.shape[-1]].clone(), right.clone(), square.clone(), total.squeeze(-1), scale
+    )
+
+
+def _members(
+    vertices: Tensor, normals: Tensor, frames: Tensor, group: PatchGroup, degree: int
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Weights (*batch, n, m) of the members, scale (*batch, n), and what is summed over them (*batch, n, rows, m).
+
+    Rows are terms of twice the degree, the height times each term, and the height squared.
+    """
     centres, members, present = group
     apart = (gather(vertices, members) - gather(vertices, centres)[..., None, :]).double()
     facing = dot(gather(normals, members), gather(normals, centres)[..., None, :]).double()
     weights = facing.clamp_min(0.0).square() * present
     distance = dot(apart, apart)
     weights = weights * torch.exp(-_NEARNESS * distance / _mean(distance, weights))
-    total = weights.sum(-1, keepdim=True)
-    total = torch.where(total > 0.0, total, 1.0)
     scale = _mean(distance, weights).sqrt()
     local = (apart / scale[..., None]) @ frames.index_select(-3, centres).mT
     x, y, z = local.unbind(-1)
     # Products of two terms are terms again, of which there are a fifth as many as pairs.
     terms, own = _monomials(x, y, 2 * degree), len(_terms(degree))
     rows = torch.stack([*terms, *(term * z for term in terms[:own]), z * z], dim=-2)
-    shares = weights / total
-    sums, squared = (rows @ torch.stack([shares, shares * weights], dim=-1)).unbind(-1)
-    count = len(terms)
-    return _Moments(
-        sums[..., :count].clone(), squared[..., :count].clone(), sums[..., count : count + own].clone(),
-        sums[..., -1].clone(), total.squeeze(-1), scale.squeeze(-1),
-    )  # fmt: skip
+    return weights, scale.squeeze(-1), rows
+
+
+def _parted(sums: Tensor, degree: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Sums (*batch, n, rows) of terms, of heights with terms, and of squared heights."""
+    count = len(_terms(2 * degree))
+    return sums[..., :count], sums[..., count:-1], sums[..., -1]
+
+
+def _total(weights: Tensor) -> Tensor:
+    """Sum along the last dimension, kept; 1 where it is zero."""
+    total = weights.sum(-1, keepdim=True)
+    return torch.where(total > 0.0, total, 1.0)
 
 
 def _mean(values: Tensor, weights: Tensor) -> Tensor:
     """Weighted mean along the last dimension, kept; 1 where it is zero."""
-    total = weights.sum(-1, keepdim=True)
-    mean = (values * weights).sum(-1, keepdim=True) / torch.where(total > 0.0, total, 1.0)
+    mean = (values * weights).sum(-1, keepdim=True) / _total(weights)
     return torch.where(mean > 0.0, mean, 1.0)
 
 

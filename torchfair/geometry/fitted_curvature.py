@@ -12,7 +12,7 @@ from .._numbers import check_count
 from .._precision import in_single_at_least
 from ..errors import ShapeError, TorchfairError
 from ..topology import Topology
-from ._height_fits import Heights, fitted_heights
+from ._height_fits import Heights, fitted_heights, fitted_normals, turned_normals
 from ._ops import norm
 from ._principal_frames import principal_frames
 from .curvature_norms import eigenvalues
@@ -146,8 +146,7 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
     check_count("rings", patches.rings, least=_LEAST_RINGS)
     if patches.places.shape[0] != topology.num_vertices:
         raise ShapeError("rings", f"patches of {topology.num_vertices} vertices", patches.places.shape[0])
-    first = fitted_heights(vertices, vertex_normals(vertices, topology), patches, 2)
-    normals, _, _ = _forms(first)
+    normals = fitted_normals(vertices, vertex_normals(vertices, topology), patches)
     heights = fitted_heights(vertices, normals, patches, _DEGREE)
     normals, operators, doubts = _forms(heights)
     whole = norm(operators.flatten(-2)).detach()
@@ -211,7 +210,7 @@ def _forms(heights: Heights) -> tuple[Tensor, Tensor, Tensor]:
     _, fx, fy, xx, xy, yy = heights.coefficients[..., :6].unbind(-1)
     slope = torch.stack([fx, fy], dim=-1)
     stretch = (1.0 + slope.square().sum(-1)).sqrt()[..., None]
-    normals = (normal - fx[..., None] * first - fy[..., None] * second) / stretch
+    normals = turned_normals(heights.frames, slope)
     tangents = torch.stack([first + fx[..., None] * normal, second + fy[..., None] * normal], dim=-2)
     # The inverse root of the first fundamental form makes them orthonormal.
     stretch = stretch[..., None]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
 
 _FEW, _ENOUGH = 0.8, 1.25  # of the vertices that the rings of a triangular lattice have
-_PAIRS = 1 << 17  # of a vertex and a member at once
+_PAIRS = 1 << 15  # of a vertex and a member at once: what is made of them stays near the cache
 
 
 class PatchGroup(NamedTuple):
