@@ -82,9 +82,13 @@ def angle_defects(vertices: Tensor, topology: Topology) -> Tensor:
         >>> angle_defects(ball.vertices, ball.topology).sum()  # 4 pi, that of every sphere
         tensor(12.5664, dtype=torch.float64)
     """
-    angles = corner_angles(vertices, topology)
+    return defects(corner_angles(vertices, topology), topology)
+
+
+def defects(angles: Tensor, topology: Topology) -> Tensor:
+    """:func:`angle_defects` (*batch, V) of corner angles (*batch, H)."""
     total = scatter_sum(angles[..., None], topology.corners, topology.num_vertices).squeeze(-1)
-    flat = math.pi * (2 - topology.is_boundary_vertex.to(vertices.dtype))
+    flat = math.pi * (2 - topology.is_boundary_vertex.to(angles.dtype))
     return torch.where(topology.valences > 0, flat - total, 0.0)
 
 

@@ -100,11 +100,15 @@ def vertex_normals(vertices: Tensor, topology: Topology) -> Tensor:
         >>> (normals - ball.normals).norm(dim=1).max() < 0.02
         tensor(True)
     """
-    normals = gather(face_normals(vertices, topology), topology.corner_faces)
-    weighted = corner_angles(vertices, topology)[..., None] * normals
+    return angle_weighted(face_normals(vertices, topology), corner_angles(vertices, topology), topology)
+
+
+def angle_weighted(normals: Tensor, angles: Tensor, topology: Topology) -> Tensor:
+    """:func:`vertex_normals` (*batch, V, 3) of face normals (*batch, F, 3) and corner angles (*batch, H)."""
+    weighted = angles[..., None] * gather(normals, topology.corner_faces)
     total = scatter_sum(weighted, topology.corners, topology.num_vertices)
     # Angles around a vertex are of order 1: anything this small is cancellation.
-    return normalise(total, 64 * torch.finfo(vertices.dtype).eps)
+    return normalise(total, 64 * torch.finfo(normals.dtype).eps)
 
 
 @in_single_at_least

@@ -48,8 +48,10 @@ def side_determinants(points: Tensor, noise: Tensor | float) -> tuple[Tensor, Te
     themselves would lose all digits.
     """
     steps = points.roll(-1, -2) - points
-    offsets = points[..., None, :, :] - points[..., :, None, :]
-    determinants = (cross(points, steps)[..., :, None, :] * offsets).sum(-1)
+    # Coordinates are held apart: sums over three numbers beside each other are slow.
+    offsets = [axis[..., None, :] - axis[..., :, None] for axis in points.unbind(-1)]
+    products = [side[..., None] * offset for side, offset in zip(cross(points, steps).unbind(-1), offsets, strict=True)]
+    determinants = products[0] + products[1] + products[2]
     size = points.shape[-2]
     index = torch.arange(size, device=points.device)
     own = (index[:, None] == index) | ((index[:, None] + 1) % size == index)
@@ -58,6 +60,7 @@ def side_determinants(points: Tensor, noise: Tensor | float) -> tuple[Tensor, Te
         noise = noise.to(points)[..., None, None]
     noise = noise + 8 * torch.finfo(points.dtype).eps
     lengths = torch.linalg.vector_norm(steps.detach(), dim=-1)[..., :, None]
-    distances = torch.linalg.vector_norm(offsets.detach(), dim=-1)
+    squares = [offset.detach().square() for offset in offsets]
+    distances = (squares[0] + squares[1] + squares[2]).sqrt()
     # A point that moves changes the determinant by the distance of the two others, to first order.
     return determinants, noise * (lengths + distances + distances.roll(-1, -2) + 4 * noise)

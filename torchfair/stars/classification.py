@@ -10,8 +10,10 @@ import torch
 from torch import Tensor
 
 from .._one_mesh import one_mesh
-from ..geometry import angle_defects, vertex_normals
+from ..geometry import corner_angles, face_normals
 from ..geometry._ops import dot
+from ..geometry.angles import defects
+from ..geometry.normals import angle_weighted
 from ..topology import Topology
 from ._groups import StarGroup, corner_planes, star_arms, star_groups
 from ._judge import edge_signs, judge_stars
@@ -143,8 +145,9 @@ def classify_stars(vertices: Tensor, topology: Topology) -> StarClasses:
         ShapeError: if ``vertices`` is not a floating tensor (V, 3).
     """
     vertices = one_mesh(vertices, topology)
-    classes = _empty(vertices, topology)
-    ordinary = vertex_normals(vertices, topology).to(torch.float64)
+    normals, angles = face_normals(vertices, topology), corner_angles(vertices, topology)
+    classes = _empty(defects(angles, topology), topology, torch.finfo(vertices.dtype).eps)
+    ordinary = angle_weighted(normals, angles, topology).to(torch.float64)
     for group in star_groups(topology):
         for start in range(0, group.centres.shape[0], _CHUNK):
             part = StarGroup(*(tensor[start : start + _CHUNK] for tensor in group))
@@ -153,14 +156,13 @@ def classify_stars(vertices: Tensor, topology: Topology) -> StarClasses:
     return classes
 
 
-def _empty(vertices: Tensor, topology: Topology) -> StarClasses:
-    """Classes of a mesh of which no star has been judged yet."""
+def _empty(defects: Tensor, topology: Topology, eps: float) -> StarClasses:
+    """Classes of a mesh with angle ``defects`` (V,), of which no star has been judged yet; ``eps`` of its positions."""
     count, device = topology.num_vertices, topology.device
     false = torch.zeros(count, dtype=torch.bool, device=device)
     zeros = torch.zeros(topology.ring_vertices.shape[0], dtype=torch.int8, device=device)
-    defects = angle_defects(vertices, topology)
     # Each of the corner angles is rounded to a few units of the last place of its size.
-    certain = defects.abs() > 8 * torch.finfo(vertices.dtype).eps * topology.valences.clamp_min(1)
+    certain = defects.abs() > 8 * eps * topology.valences.clamp_min(1)
     inner = ~topology.is_boundary_vertex & (topology.valences > 0)
     return StarClasses(
         topology=topology,

@@ -8,13 +8,15 @@ import torch
 from torch import Tensor
 
 from ..errors import MeshError
-from ..geometry import dihedral_angles, face_normals, vertex_normals
+from ..geometry import corner_angles, dihedral_angles, face_normals
 from ..geometry._ops import cross, dot, gather, scatter_sum
+from ..geometry.normals import angle_weighted
 from ..topology import Topology
 from ._groups import star_groups
 from .arcs import arc_crossings
 
-_ROOM = 1 << 21  # entries of the tables of one chunk of pyramids
+_ROOM = 1 << 18  # entries of the tables of one chunk of pyramids: few enough for the cache
+_POINTS = 1 << 15  # normals looked at together, likewise
 
 
 def normal_pyramid(vertices: Tensor, topology: Topology, vertex: int) -> Tensor:
@@ -120,15 +122,20 @@ def pyramid_windings(vertices: Tensor, topology: Topology) -> Tensor:
         ShapeError: if ``vertices`` is not a floating tensor (*batch, V, 3).
     """
     vertices = vertices.detach()
-    normals, axes = face_normals(vertices, topology), vertex_normals(vertices, topology)
+    normals = face_normals(vertices, topology)
+    axes = angle_weighted(normals, corner_angles(vertices, topology), topology)
     windings = torch.zeros(vertices.shape[:-1], dtype=torch.int64, device=vertices.device)
-    for centres, _, corners in star_groups(topology):
-        axis = gather(axes, centres)[..., None, :]
-        rows = gather(normals, topology.corner_faces[corners])
-        rows = rows - dot(rows, axis)[..., None] * axis
-        ahead = rows.roll(-1, -2)
-        turns = torch.atan2(dot(cross(rows, ahead), axis), dot(rows, ahead)).sum(-1) / (2 * math.pi)
-        windings[..., centres] = torch.nan_to_num(turns).round().to(torch.int64)
+    batch = max(1, math.prod(vertices.shape[:-2]))
+    for group in star_groups(topology):
+        step = max(1, _POINTS // (batch * group.ring.shape[1]))
+        for start in range(0, group.centres.shape[0], step):
+            centres, corners = (tensor[start : start + step] for tensor in (group.centres, group.corners))
+            axis = gather(axes, centres)[..., None, :]
+            rows = gather(normals, topology.corner_faces[corners])
+            rows = rows - dot(rows, axis)[..., None] * axis
+            ahead = rows.roll(-1, -2)
+            turns = torch.atan2(dot(cross(rows, ahead), axis), dot(rows, ahead)).sum(-1) / (2 * math.pi)
+            windings[..., centres] = torch.nan_to_num(turns).round().to(torch.int64)
     return windings
 
 
