@@ -10,7 +10,7 @@ from helpers import DOUBLE, wavy_grid
 from torch import Tensor
 
 from torchfair import TorchfairError
-from torchfair.projection import ElementTerm, ProjectionSettings, Status, guided_projection
+from torchfair.projection import ElementTerm, GuidedProjection, ProjectionSettings, Status, affine, guided_projection
 
 
 def spring(x: Tensor) -> Tensor:
@@ -107,3 +107,13 @@ def test_terms_without_elements_or_weight_count_for_nothing() -> None:
         among = guided_projection(blocks, [*empty, *terms, idle], settings=settings)
         assert torch.equal(alone.blocks["x"], among.blocks["x"])
         assert [row.elements for row in among.residuals[:1]] == [0]
+
+
+@pytest.mark.parametrize("entries", [1, 7, 1 << 23])
+def test_the_diagonal_is_summed_some_entries_at_a_time(entries: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(affine, "_ENTRIES", entries)
+    part = GuidedProjection(*springs_and_anchors()).structure.affine
+    assert part is not None
+    assert part.jacobian.nnz > 7
+    expected = torch.from_numpy(part.jacobian.toarray()).square().sum(0)
+    torch.testing.assert_close(part.diagonal, expected, rtol=1e-14, atol=0)

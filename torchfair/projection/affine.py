@@ -17,6 +17,7 @@ from .layout import Layout, State
 from .portions import portions
 
 _TOLERANCE = 1e-3
+_ENTRIES = 1 << 23
 
 
 class AffinePart:
@@ -159,7 +160,11 @@ class AffinePart:
     @cached_property
     def diagonal(self) -> Tensor:
         """(N,) of ``A^T A``."""
-        squares = np.bincount(self.jacobian.indices, self.jacobian.data**2, self.jacobian.shape[1])
+        columns, values = self.jacobian.indices, self.jacobian.data
+        squares = np.zeros(self.jacobian.shape[1])
+        for start in range(0, values.size, _ENTRIES):  # wide numbers of all columns would be as large as the matrix
+            part = slice(start, start + _ENTRIES)
+            squares += np.bincount(columns[part], values[part] ** 2, squares.size)
         return torch.from_numpy(squares).to(self.offset)
 
 

@@ -70,6 +70,7 @@ def init(problem: Problem, blocks: State, settings: ProjectionSettings | None = 
     problem.check_blocks(blocks)
     evaluation = problem.structure.evaluate({name: block.detach().clone() for name, block in blocks.items()})
     check_start(problem.structure, evaluation)
+    hand_back_free_memory(problem.layout.num_unknowns)
     linearised, standings = _linearise(problem, evaluation, settings)
     check_linearised(problem.structure, linearised.system)
     damping = (ConstantDamping if settings.takes_every_step else Damping)(settings.initial_damping)
