@@ -1,4 +1,4 @@
-"""Fine meshes, all of whose edges are nearly flat: what counts as flat falls with them."""
+"""Fine meshes, all of whose edges are nearly flat: what counts as flat and fairness fall with them."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from torchfair.geometry import edge_lengths
 from torchfair.shapes import PrincipalParaboloid, Torus, icosphere, irregular_triangles
 
 
-def sharpness(vertices: torch.Tensor, topology: object) -> float:
+def energy_scale(vertices: torch.Tensor, topology: object) -> float:
     """Of a mesh in its mean edge length."""
     vertices = vertices / edge_lengths(vertices, topology).mean()
-    return FairProblem(vertices, topology, None, Pulls(vertices), FairSettings()).sharpness
+    return FairProblem(vertices, topology, None, Pulls(vertices), FairSettings()).energy_scale
 
 
 def test_coarse_meshes_are_left_alone_and_fine_ones_fall_in_proportion() -> None:
-    mesh = irregular_triangles(Torus(), 150)
-    assert sharpness(mesh.vertices, mesh.topology) == 1.0
+    coarse = icosphere(0)
+    assert energy_scale(coarse.vertices, coarse.topology) == 1.0
     found = []
     for level in (4, 5):
         fine = icosphere(level)
         scaled = fine.vertices / edge_lengths(fine.vertices, fine.topology).mean()
         mean = float(normal_variation_per_edge(scaled, fine.topology).mean())
-        found.append(sharpness(fine.vertices, fine.topology))
-        assert found[-1] == pytest.approx(min(1.0, mean / 0.05), rel=1e-12)
-        assert sharpness(1e-6 * fine.vertices, fine.topology) == pytest.approx(found[-1], rel=1e-9)
+        found.append(energy_scale(fine.vertices, fine.topology))
+        assert found[-1] == pytest.approx(min(1.0, mean / 0.4), rel=1e-12)
+        assert energy_scale(1e-6 * fine.vertices, fine.topology) == pytest.approx(found[-1], rel=1e-9)
     assert found[1] == pytest.approx(0.5 * found[0], rel=0.02)  # l* is halved
 
 
 def test_flat_meshes_keep_some_smoothing() -> None:
     vertices, topology = wavy_grid(5, 4)
     flat = vertices * torch.tensor([1.0, 1.0, 0.0], dtype=vertices.dtype)
-    assert sharpness(flat, topology) == 0.01
+    assert energy_scale(flat, topology) == 0.01
 
 
 def test_it_lowers_the_energy_of_a_shallow_saddle(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -50,5 +50,29 @@ def test_it_lowers_the_energy_of_a_shallow_saddle(monkeypatch: pytest.MonkeyPatc
         return float(normal_variation(job.vertices, mesh.topology))
 
     sharp = reached()
-    monkeypatch.setattr(problem, "_USUAL", 1e-9)
+    monkeypatch.setattr(problem, "_COARSE", 1e-9)
     assert sharp < 0.99 * reached()
+
+
+def fairness_weight(job: FairProblem, blur: float) -> float:
+    """Of the fairness of a stage, along the boundary too."""
+    (weight,) = {term.weight for term in job.terms(1.0, blur) if "fairness" in term.name}
+    return weight
+
+
+def test_fairness_falls_with_the_blur_from_its_weight_to_its_share_of_it() -> None:
+    vertices, topology = wavy_grid(7, 6)
+    vertices = torch.tensor([1.0, 1.0, 0.2], dtype=vertices.dtype) * vertices
+    vertices = vertices / edge_lengths(vertices, topology).mean()
+    job = FairProblem(vertices, topology, None, Pulls(vertices), FairSettings(fairness_weight=0.7))
+    scale = job.energy_scale
+    assert 0.1 < scale < 0.3
+    assert fairness_weight(job, 1.0) == pytest.approx(0.7 * scale)
+    assert fairness_weight(job, 3.0) == pytest.approx(2.1 * scale)
+    assert fairness_weight(job, 10.0) == 0.7
+
+
+def test_the_printed_method_weighs_as_printed() -> None:
+    vertices, topology = wavy_grid(7, 6)
+    job = FairProblem(vertices, topology, None, Pulls(vertices), FairSettings.paper(w_fair=0.7))
+    assert fairness_weight(job, 1.0) == 4.0 * 0.7

@@ -45,7 +45,8 @@ class FairSettings:
         distance_back: No vertex of the input is farther from the result than this; said where it is not so.
         reference_distance: A reference is refused if a vertex of the start is farther from it than this.
         fairness_weight: Weight of an eighth of squared second differences (between quads, and along the boundary) and
-            of half of squared umbrella vectors (elsewhere).
+            of half of squared umbrella vectors (elsewhere). Of a mesh whose mean ``l l*`` is below 0.4 it falls with that
+            mean: fairness grows with the number of vertices, E with its root only.
         second_differences: Whether fairness is that of second differences along all mesh polylines, the paper's, on
             triangle meshes too.
         handle_weight: Weight of half the squared distance of handles from their targets.
@@ -86,9 +87,10 @@ class FairSettings:
         faces_may_turn: Whether faces may turn over against the start where handles pull, step by step: for shapes that
             end far from where they begin.
         quality_weight: Weight of half the squared barriers before those bounds.
-        smoothing: ``l l*`` below this is treated as flat, in mean edge lengths. Of a fine mesh, whose mean ``l l*`` is
-            below 0.05, it falls with that mean: else all edges would be flat.
-        continuation: Factors of ``smoothing`` in stages before the last, falling; empty for the last stage alone.
+        smoothing: ``l l*`` below this is treated as flat, in mean edge lengths. It falls like the weight of fairness:
+            else all edges of a fine mesh would be flat.
+        continuation: Factors of ``smoothing`` in stages before the last, and of the weight of fairness up to the one
+            given, falling; empty for the last stage alone.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables too.
         constraint_weight: Weight of half the squared constraints that define the auxiliary variables.
         projection: Iterations, tolerances, damping and linear solver.

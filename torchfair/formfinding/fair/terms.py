@@ -23,7 +23,7 @@ def fair_terms(problem: FairProblem, share: float, blur: float = 1.0) -> list[El
     Args:
         problem: What they are of.
         share: How far constraints that are violated are imposed; above 1 it raises planarity beyond its weight.
-        blur: Factor of the smoothing of the absolute value.
+        blur: Factor of the smoothing of the absolute value, and of fairness up to its weight in the settings.
     """
     settings, panels = problem.settings, problem.panels
     return [
@@ -31,7 +31,7 @@ def fair_terms(problem: FairProblem, share: float, blur: float = 1.0) -> list[El
         *problem.near.terms(weight=settings.closeness_weight, barrier_weight=settings.quality_weight),
         *_boundary(problem),
         *_loosely(problem),
-        *_fairness(problem),
+        *_fairness(problem, blur),
         *problem.bounds.terms(settings),
         *problem.pulls.terms(weight=settings.handle_weight),
         *panels.planar_terms(share),
@@ -60,7 +60,7 @@ def planar_terms(problem: FairProblem, share: float) -> list[ElementTerm]:
 def _energy(problem: FairProblem, blur: float) -> list[ElementTerm]:
     settings, topology = problem.settings, problem.topology
     if settings.formulation == "reduced":
-        smoothing = blur * settings.smoothing * problem.sharpness
+        smoothing = blur * settings.smoothing * problem.energy_scale
         return c.normal_variation_terms(topology, smoothing=smoothing, weight=settings.energy_weight)
     planar = topology.face_sizes == 3
     planar[problem.panels.planar] = True
@@ -81,9 +81,9 @@ def _directions(problem: FairProblem, share: float = 1.0) -> list[ElementTerm]:
     return c.edge_direction_terms(problem.vertices, problem.topology, every, weight=weight)
 
 
-def _fairness(problem: FairProblem) -> list[ElementTerm]:
+def _fairness(problem: FairProblem, blur: float) -> list[ElementTerm]:
     settings, topology, corners = problem.settings, problem.topology, problem.corners
-    weight = settings.fairness_weight
+    weight = settings.fairness_weight * min(1.0, blur * problem.energy_scale)
     if settings.second_differences:
         return c.polyline_fairness_terms(topology, weight=weight, corners=corners)
     terms = c.interior_fairness_terms(topology, weight=weight)
