@@ -15,33 +15,35 @@ from torchfair.geometry import edge_lengths
 from torchfair.shapes import PrincipalParaboloid, Torus, icosphere, irregular_triangles
 
 
-def energy_scale(vertices: torch.Tensor, topology: object) -> float:
-    """Of a mesh in its mean edge length."""
+def scales(vertices: torch.Tensor, topology: object) -> tuple[float, float]:
+    """Of smoothing and fairness of a mesh in its mean edge length."""
     vertices = vertices / edge_lengths(vertices, topology).mean()
-    return FairProblem(vertices, topology, None, Pulls(vertices), FairSettings()).energy_scale
+    job = FairProblem(vertices, topology, None, Pulls(vertices), FairSettings())
+    return job.smoothing_scale, job.fairness_scale
 
 
 def test_coarse_meshes_are_left_alone_and_fine_ones_fall_in_proportion() -> None:
     coarse = icosphere(0)
-    assert energy_scale(coarse.vertices, coarse.topology) == 1.0
+    assert scales(coarse.vertices, coarse.topology) == (1.0, 1.0)
     found = []
     for level in (4, 5):
         fine = icosphere(level)
         scaled = fine.vertices / edge_lengths(fine.vertices, fine.topology).mean()
         mean = float(normal_variation_per_edge(scaled, fine.topology).mean())
-        found.append(energy_scale(fine.vertices, fine.topology))
-        assert found[-1] == pytest.approx(min(1.0, mean / 0.4), rel=1e-12)
-        assert energy_scale(1e-6 * fine.vertices, fine.topology) == pytest.approx(found[-1], rel=1e-9)
-    assert found[1] == pytest.approx(0.5 * found[0], rel=0.02)  # l* is halved
+        found.append(scales(fine.vertices, fine.topology))
+        assert found[-1] == pytest.approx((min(1.0, mean / 0.05), min(1.0, mean / 0.4)), rel=1e-12)
+        assert scales(1e-6 * fine.vertices, fine.topology) == pytest.approx(found[-1], rel=1e-9)
+    assert found[1] == pytest.approx([0.5 * scale for scale in found[0]], rel=0.02)  # l* is halved
 
 
-def test_flat_meshes_keep_some_smoothing() -> None:
+def test_flat_meshes_keep_some_smoothing_and_fairness() -> None:
     vertices, topology = wavy_grid(5, 4)
     flat = vertices * torch.tensor([1.0, 1.0, 0.0], dtype=vertices.dtype)
-    assert energy_scale(flat, topology) == 0.01
+    assert scales(flat, topology) == (0.01, 0.01)
 
 
-def test_it_lowers_the_energy_of_a_shallow_saddle(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("bound", ["_SMOOTHED", "_FAIR"])
+def test_they_lower_the_energy_of_a_shallow_saddle(bound: str, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = irregular_triangles(PrincipalParaboloid(0.12, -0.08), 250)
 
     def reached() -> float:
@@ -49,9 +51,9 @@ def test_it_lowers_the_energy_of_a_shallow_saddle(monkeypatch: pytest.MonkeyPatc
         assert all(promise.holds for promise in job.promises)
         return float(normal_variation(job.vertices, mesh.topology))
 
-    sharp = reached()
-    monkeypatch.setattr(problem, "_COARSE", 1e-9)
-    assert sharp < 0.99 * reached()
+    scaled = reached()
+    monkeypatch.setattr(problem, bound, 1e-9)
+    assert scaled < 0.99 * reached()
 
 
 def fairness_weight(job: FairProblem, blur: float) -> float:
@@ -65,7 +67,7 @@ def test_fairness_falls_with_the_blur_from_its_weight_to_its_share_of_it() -> No
     vertices = torch.tensor([1.0, 1.0, 0.2], dtype=vertices.dtype) * vertices
     vertices = vertices / edge_lengths(vertices, topology).mean()
     job = FairProblem(vertices, topology, None, Pulls(vertices), FairSettings(fairness_weight=0.7))
-    scale = job.energy_scale
+    scale = job.fairness_scale
     assert 0.1 < scale < 0.3
     assert fairness_weight(job, 1.0) == pytest.approx(0.7 * scale)
     assert fairness_weight(job, 3.0) == pytest.approx(2.1 * scale)

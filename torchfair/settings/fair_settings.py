@@ -87,8 +87,9 @@ class FairSettings:
         faces_may_turn: Whether faces may turn over against the start where handles pull, step by step: for shapes that
             end far from where they begin.
         quality_weight: Weight of half the squared barriers before those bounds.
-        smoothing: ``l l*`` below this is treated as flat, in mean edge lengths. It falls like the weight of fairness:
-            else all edges of a fine mesh would be flat.
+        smoothing: ``l l*`` below this is treated as flat, in mean edge lengths. Of a mesh whose mean ``l l*`` is below
+            0.05 it falls with that mean: else all edges would be flat. A smaller one leads to a smaller E, but gathers
+            what bends in fewer edges, so that reflections break more visibly.
         continuation: Factors of ``smoothing`` in stages before the last, and of the weight of fairness up to the one
             given, falling; empty for the last stage alone.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables too.

@@ -31,7 +31,8 @@ from .terms import fair_terms, planar_terms
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8
 _MOST_STAGES = 20
-_COARSE = 0.4  # mean of l l* in mean edge lengths, below which smoothing and fairness fall with it
+_SMOOTHED = 0.05  # mean of l l* in mean edge lengths, below which the smoothing falls with it
+_FAIR = 0.4  # likewise for the weight of fairness
 _LEAST = 0.01  # to which they fall at most, as where a mesh is flat
 
 
@@ -51,7 +52,8 @@ class FairProblem:
     Attributes:
         near: Closeness to the reference surface.
         bounds: On corner angles and areas of faces.
-        energy_scale: Of E of an edge of the start; smoothing and fairness of the settings are multiplied by it.
+        smoothing_scale: By which the smoothing of the settings is multiplied: below 1 where the mesh is fine.
+        fairness_scale: Likewise for the weight of fairness in the last stage.
         input_edge: Mean edge length of the input.
         curves: Along boundary and creases.
         corners: (V,) bool, where the boundary turns.
@@ -83,7 +85,10 @@ class FairProblem:
         self.input_edge, self.curves = input_edge, rim or feature_curves(vertices, topology, settings)
         self.corners = self.curves.rim.corners
         self._tell_of_creases()
-        self.energy_scale = 1.0 if settings.projection.takes_every_step else _energy_scale(vertices, topology)
+        energy = 1.0 if settings.projection.takes_every_step else _mean_energy(vertices, topology)
+        self.smoothing_scale, self.fairness_scale = (
+            min(1.0, max(energy / usual, _LEAST)) for usual in (_SMOOTHED, _FAIR)
+        )
         self.bounds = FaceBounds(vertices, topology, pulls)
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
@@ -307,16 +312,11 @@ class FairProblem:
         )
 
 
-def _energy_scale(vertices: Tensor, topology: Topology) -> float:
-    """Mean ``l l*`` against that of a coarse mesh, at most 1: the finer a mesh, the smaller.
-
-    Else all edges of a fine mesh would count as flat, and fairness, whose sum grows with V where that of E grows with
-    its root, would outweigh E.
-    """
+def _mean_energy(vertices: Tensor, topology: Topology) -> float:
+    """Mean ``l l*`` of the interior edges, which falls as a mesh becomes finer; 1 where there are none."""
     if not topology.num_interior_edges:
         return 1.0
-    mean = float(normal_variation_per_edge(vertices, topology).mean())
-    return min(1.0, max(mean / _COARSE, _LEAST))
+    return float(normal_variation_per_edge(vertices, topology).mean())
 
 
 def feature_curves(vertices: Tensor, topology: Topology, settings: FairSettings) -> FeatureCurves:

@@ -60,7 +60,7 @@ def planar_terms(problem: FairProblem, share: float) -> list[ElementTerm]:
 def _energy(problem: FairProblem, blur: float) -> list[ElementTerm]:
     settings, topology = problem.settings, problem.topology
     if settings.formulation == "reduced":
-        smoothing = blur * settings.smoothing * problem.energy_scale
+        smoothing = blur * settings.smoothing * problem.smoothing_scale
         return c.normal_variation_terms(topology, smoothing=smoothing, weight=settings.energy_weight)
     planar = topology.face_sizes == 3
     planar[problem.panels.planar] = True
@@ -83,7 +83,7 @@ def _directions(problem: FairProblem, share: float = 1.0) -> list[ElementTerm]:
 
 def _fairness(problem: FairProblem, blur: float) -> list[ElementTerm]:
     settings, topology, corners = problem.settings, problem.topology, problem.corners
-    weight = settings.fairness_weight * min(1.0, blur * problem.energy_scale)
+    weight = settings.fairness_weight * min(1.0, blur * problem.fairness_scale)
     if settings.second_differences:
         return c.polyline_fairness_terms(topology, weight=weight, corners=corners)
     terms = c.interior_fairness_terms(topology, weight=weight)
