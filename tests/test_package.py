@@ -17,7 +17,7 @@ import pytest
 import torchfair
 
 HEAVY = {
-    *("trimesh", "networkx", "PIL", "rslab"),
+    *("trimesh", "kornia", "kornia_rs", "networkx", "PIL", "rslab"),
     *("matplotlib", "rich", "polyscope", "viser", "pyvista", "vtk", "plotly"),
     *("scipy.spatial", "scipy.optimize", "scipy.sparse.csgraph"),
 }

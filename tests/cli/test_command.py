@@ -127,7 +127,7 @@ import sys
 from torchfair.cli import main
 from torchfair.cli.command import build_parser
 build_parser().parse_args(["measure", "x.obj"])
-heavy = {{"trimesh", "matplotlib", "rich", "scipy", "torchfair.projection"}} & set(sys.modules)
+heavy = {{"trimesh", "kornia", "matplotlib", "rich", "scipy", "torchfair.projection"}} & set(sys.modules)
 sys.exit(f"parsing imported {{heavy}}" if heavy else main(["measure", {triangle_file!r}]))
 """
     read, write = os.pipe()

@@ -103,7 +103,11 @@ def _strictly(device: torch.device, chosen: bool) -> AbstractContextManager[obje
 
 
 @pytest.mark.parametrize("name", LOSSES)
-def test_losses_are_the_same_on_another_device_and_do_not_wait_for_it(name: str, device: torch.device) -> None:
+def test_losses_are_the_same_on_another_device_and_do_not_wait_for_it(
+    name: str, device: torch.device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if device == PRETENDED:  # kornia switches off lower precision, which this device does not have
+        monkeypatch.setattr(torch, "autocast", lambda **settings: nullcontext())
     meshes = [wavy_grid(5, 5, triangles=True)] + ([] if name in TRIANGLES_ONLY else [mixed_grid()])
     for make in LOSSES[name]:
         for vertices, topology in meshes:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ._similarity import WINDOW, structural_similarity
+WINDOW = 11
+"""Pixels along the square that the structural similarity (SSIM) of a pixel looks at."""
+
 
 _COVERED = 1 - 1e-4  # coverage is a mean, rounded
 
@@ -30,13 +32,16 @@ def dissimilarity(image: Tensor, reference: Tensor, window: Tensor) -> Tensor:
     Args:
         image: (*batch, channels, H, W) in 0..1.
         reference: of the same shape, or one that broadcasts to it.
-        window: (*batch, H, W) bool, as of :func:`comparison_window`: squares around its pixels are in the pictures.
+        window: (*batch, H, W) bool.
     """
-    if min(image.shape[-2:]) < WINDOW:
-        return image.new_zeros(image.shape[:-2])
-    inside = slice(WINDOW // 2, -(WINDOW // 2))
-    different = 1.0 - structural_similarity(image, reference.expand(image.shape))
-    return masked_mean(different, window[..., None, inside, inside])
+    from kornia.metrics import ssim
+
+    shape = image.shape
+    if min(shape[-2:]) <= WINDOW:  # too small for kornia to pad, and for a window
+        return image.new_zeros(shape[:-2])
+    first, second = (picture.expand(shape).reshape(-1, *shape[-3:]) for picture in (image, reference))
+    similarity = ssim(first, second, WINDOW, eps=0.0).view(shape)
+    return masked_mean(1 - similarity, window[..., None, :, :])
 
 
 def masked_mean(values: Tensor, mask: Tensor) -> Tensor:
