@@ -12,7 +12,7 @@ from torchfair.formfinding.fair import problem
 from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.formfinding.job.pulls import Pulls
 from torchfair.geometry import edge_lengths
-from torchfair.shapes import PrincipalParaboloid, Torus, icosphere, irregular_triangles
+from torchfair.shapes import PrincipalParaboloid, icosphere, irregular_triangles
 
 
 def scales(vertices: torch.Tensor, topology: object) -> tuple[float, float]:
