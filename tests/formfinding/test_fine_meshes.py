@@ -8,14 +8,14 @@ from helpers import wavy_grid
 
 from torchfair.energies import normal_variation, normal_variation_per_edge
 from torchfair.formfinding import FairSettings, minimise_normal_variation
-from torchfair.formfinding.fair import problem
+from torchfair.formfinding.fair import scales as of_fairness
 from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.formfinding.job.pulls import Pulls
 from torchfair.geometry import edge_lengths
 from torchfair.shapes import PrincipalParaboloid, icosphere, irregular_triangles
 
 
-def scales(vertices: torch.Tensor, topology: object) -> tuple[float, float]:
+def factors(vertices: torch.Tensor, topology: object) -> tuple[float, float]:
     """Of smoothing and fairness of a mesh in its mean edge length."""
     vertices = vertices / edge_lengths(vertices, topology).mean()
     job = FairProblem(vertices, topology, None, Pulls(vertices), FairSettings())
@@ -24,22 +24,22 @@ def scales(vertices: torch.Tensor, topology: object) -> tuple[float, float]:
 
 def test_coarse_meshes_are_left_alone_and_fine_ones_fall_in_proportion() -> None:
     coarse = icosphere(0)
-    assert scales(coarse.vertices, coarse.topology) == (1.0, 1.0)
+    assert factors(coarse.vertices, coarse.topology) == (1.0, 1.0)
     found = []
     for level in (4, 5):
         fine = icosphere(level)
         scaled = fine.vertices / edge_lengths(fine.vertices, fine.topology).mean()
         mean = float(normal_variation_per_edge(scaled, fine.topology).mean())
-        found.append(scales(fine.vertices, fine.topology))
+        found.append(factors(fine.vertices, fine.topology))
         assert found[-1] == pytest.approx((min(1.0, mean / 0.05), min(1.0, mean / 0.4)), rel=1e-12)
-        assert scales(1e-6 * fine.vertices, fine.topology) == pytest.approx(found[-1], rel=1e-9)
+        assert factors(1e-6 * fine.vertices, fine.topology) == pytest.approx(found[-1], rel=1e-9)
     assert found[1] == pytest.approx([0.5 * scale for scale in found[0]], rel=0.02)  # l* is halved
 
 
 def test_flat_meshes_keep_some_smoothing_and_fairness() -> None:
     vertices, topology = wavy_grid(5, 4)
     flat = vertices * torch.tensor([1.0, 1.0, 0.0], dtype=vertices.dtype)
-    assert scales(flat, topology) == (0.01, 0.01)
+    assert factors(flat, topology) == (0.01, 0.01)
 
 
 @pytest.mark.parametrize("bound", ["_SMOOTHED", "_FAIR"])
@@ -52,7 +52,7 @@ def test_they_lower_the_energy_of_a_shallow_saddle(bound: str, monkeypatch: pyte
         return float(normal_variation(job.vertices, mesh.topology))
 
     scaled = reached()
-    monkeypatch.setattr(problem, bound, 1e-9)
+    monkeypatch.setattr(of_fairness, bound, 1e-9)
     assert scaled < 0.99 * reached()
 
 
@@ -72,6 +72,19 @@ def test_fairness_falls_with_the_blur_from_its_weight_to_its_share_of_it() -> No
     assert fairness_weight(job, 1.0) == pytest.approx(0.7 * scale)
     assert fairness_weight(job, 3.0) == pytest.approx(2.1 * scale)
     assert fairness_weight(job, 10.0) == 0.7
+
+
+def test_fairness_counts_in_full_where_handles_leave_the_reference() -> None:
+    vertices, topology = wavy_grid(7, 6)
+    vertices = torch.tensor([1.0, 1.0, 0.2], dtype=vertices.dtype) * vertices
+    vertices = vertices / edge_lengths(vertices, topology).mean()
+    pulls = Pulls(vertices)
+    job = FairProblem(vertices, topology, None, pulls, FairSettings(fairness_weight=0.7))
+    handle = torch.tensor([24])
+    for height, full in ((0.01, False), (2.0, True), (0.01, False)):
+        pulls.pull(handle, vertices[handle] + torch.tensor([0.0, 0.0, height], dtype=vertices.dtype))
+        job.reconsider()
+        assert (fairness_weight(job, 1.0) == 0.7) == full
 
 
 def test_the_printed_method_weighs_as_printed() -> None:

@@ -46,7 +46,8 @@ class FairSettings:
         reference_distance: A reference is refused if a vertex of the start is farther from it than this.
         fairness_weight: Weight of an eighth of squared second differences (between quads, and along the boundary) and
             of half of squared umbrella vectors (elsewhere). Where the mean ``l l*`` of a mesh is below 0.4, it falls
-            with that mean: fairness grows with the number of vertices, E with its root only.
+            with that mean, unless handles pull it off its reference surface: fairness grows with the number of
+            vertices, E with its root only.
         second_differences: Whether fairness is that of second differences along all mesh polylines, the paper's, on
             triangle meshes too.
         handle_weight: Weight of half the squared distance of handles from their targets.

@@ -13,6 +13,7 @@ from ...boundary import boundary_corners
 from ...constraints.fairness_residuals import second_difference
 from ...creases import crease_chains, crease_corners, crease_edges
 from ...projection import ElementTerm
+from ...settings.fair_settings import FairSettings
 from ...subdivision import Refinement
 from ...topology import Topology
 from ..boundary_curves import BoundaryCurves
@@ -107,3 +108,10 @@ def _owners(topology: Topology, edges: Tensor, corners: Tensor) -> Tensor:
         owners[ends] = edges[found]
     owners[corners] = -1  # they belong to several, but do not glide
     return owners
+
+
+def feature_curves(vertices: Tensor, topology: Topology, settings: FairSettings) -> FeatureCurves:
+    """Along boundary and creases of a mesh (V, 3), with creases and corners where the settings see them."""
+    return FeatureCurves.through(
+        vertices, topology, corner_angle=settings.corner_angle, crease_angle=settings.crease_angle
+    )

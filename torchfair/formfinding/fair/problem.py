@@ -10,7 +10,6 @@ import torch
 from torch import Tensor
 
 from ...constraints import lifted_normal_variation_blocks
-from ...energies import normal_variation_per_edge
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...settings.fair_settings import FairSettings
@@ -20,20 +19,18 @@ from ..job.pulls import Pulls
 from ..references import GivenReference
 from .face_bounds import FaceBounds
 from .face_planes import on_face_planes
-from .feature_curves import FeatureCurves
+from .feature_curves import FeatureCurves, feature_curves
 from .free_boundary import FreeBoundary
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
 from .panels import PLANAR_PROMISE, Panels
+from .scales import scales
 from .terms import fair_terms, planar_terms
 
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8
 _MOST_STAGES = 20
-_SMOOTHED = 0.05  # mean of l l* in mean edge lengths, below which the smoothing falls with it
-_FAIR = 0.4  # likewise for the weight of fairness
-_LEAST = 0.01  # to which they fall at most, as where a mesh is flat
 
 
 class FairProblem:
@@ -53,7 +50,6 @@ class FairProblem:
         near: Closeness to the reference surface.
         bounds: On corner angles and areas of faces.
         smoothing_scale: By which the smoothing of the settings is multiplied: below 1 where the mesh is fine.
-        fairness_scale: Likewise for the weight of fairness in the last stage.
         input_edge: Mean edge length of the input.
         curves: Along boundary and creases.
         corners: (V,) bool, where the boundary turns.
@@ -85,10 +81,9 @@ class FairProblem:
         self.input_edge, self.curves = input_edge, rim or feature_curves(vertices, topology, settings)
         self.corners = self.curves.rim.corners
         self._tell_of_creases()
-        energy = 1.0 if settings.projection.takes_every_step else _mean_energy(vertices, topology)
-        self.smoothing_scale, self.fairness_scale = (
-            min(1.0, max(energy / usual, _LEAST)) for usual in (_SMOOTHED, _FAIR)
-        )
+        self.smoothing_scale, self._fairness_scale = 1.0, 1.0
+        if not settings.projection.takes_every_step:
+            self.smoothing_scale, self._fairness_scale = scales(vertices, topology)
         self.bounds = FaceBounds(vertices, topology, pulls)
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
@@ -125,6 +120,11 @@ class FairProblem:
         self.near.reconsider()
         self.has_other_goals = bool(self.pulls.pulled.any()) or self._has_other_reference
         self.__dict__.pop("guard", None)
+
+    @property
+    def fairness_scale(self) -> float:
+        """By which the weight of fairness is multiplied in the last stage; 1 where handles leave the reference."""
+        return 1.0 if self.near.design_mode else self._fairness_scale
 
     def snapshot(self) -> Callable[[], None]:
         """A function that puts back what handles have changed."""
@@ -310,17 +310,3 @@ class FairProblem:
             from_last=self.near.design_mode or self.pulls.everywhere,
             may_turn=self.pulls.everywhere or self.settings.faces_may_turn,
         )
-
-
-def _mean_energy(vertices: Tensor, topology: Topology) -> float:
-    """Mean ``l l*`` of the interior edges, which falls as a mesh becomes finer; 1 where there are none."""
-    if not topology.num_interior_edges:
-        return 1.0
-    return float(normal_variation_per_edge(vertices, topology).mean())
-
-
-def feature_curves(vertices: Tensor, topology: Topology, settings: FairSettings) -> FeatureCurves:
-    """Along boundary and creases of a mesh (V, 3), with creases and corners where the settings see them."""
-    return FeatureCurves.through(
-        vertices, topology, corner_angle=settings.corner_angle, crease_angle=settings.crease_angle
-    )

@@ -15,10 +15,10 @@ from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference, refuse_far_reference
-from .feature_curves import FeatureCurves
+from .feature_curves import FeatureCurves, feature_curves
 from .measures import fair_measures, fair_promises, located
 from .plan import FairPlan
-from .problem import FairProblem, feature_curves
+from .problem import FairProblem
 from .refinement import refined
 
 
