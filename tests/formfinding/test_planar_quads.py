@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,8 +11,9 @@ import torch
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.formfinding import PLANAR_QUADS, FairSettings, JobResult, Level, planar_quads
+from torchfair.formfinding import PLANAR_QUADS, FairSettings, JobResult, Level, Promise, planar_quads
 from torchfair.meshing import QuadMesh, principal_quads
+from torchfair.projection import Callback, Status
 from torchfair.shapes import PrincipalParaboloid, builtin_mesh, irregular_triangles
 
 MODULE = sys.modules[planar_quads.__module__]
@@ -77,6 +79,74 @@ def test_a_solve_that_is_stopped_is_not_followed_by_another(saddle, asked, monke
     monkeypatch.setattr(MODULE, "_TURNED", -90.0)
     planar_quads(mesh, surface, callback=lambda record: True)
     assert len(asked) == 1
+
+
+def stops_the_second_solve(asked: list[FairSettings]) -> Callback:
+    return lambda record: len(asked) > 1 or None
+
+
+def raises_in_the_second_solve(asked: list[FairSettings]) -> Callback:
+    def interrupt(record: object) -> None:
+        if len(asked) > 1:
+            raise KeyboardInterrupt
+
+    return interrupt
+
+
+@pytest.mark.parametrize(
+    ("ending", "status"),
+    [(stops_the_second_solve, Status.CALLBACK), (raises_in_the_second_solve, Status.INTERRUPTED)],
+)
+def test_who_stops_the_second_solve_gets_the_first_and_is_told_that_it_was_stopped(
+    saddle, asked, monkeypatch, ending, status
+):
+    surface, mesh = saddle
+    once, _ = planar_quads(mesh, surface)
+    asked.clear()
+    monkeypatch.setattr(MODULE, "_TURNED", -90.0)
+    made, job = planar_quads(mesh, surface, callback=ending(asked))
+    assert len(asked) == 2
+    assert torch.equal(made.vertices, once.vertices)
+    assert job.holds
+    assert job.stopped
+    assert job.projection.status is status
+    assert job.message in made.notes[-1]
+
+
+@pytest.mark.parametrize(
+    ("measure", "first", "second", "taken"),
+    [
+        ("largest_planarity", 2e-4, 3e-4, False),
+        ("largest_planarity", 3e-4, 2e-4, True),
+        ("largest_distance_relative", 0.05, 0.06, False),
+        ("largest_distance_relative", 0.01, 0.03, True),
+    ],
+)
+def test_what_turns_less_is_taken_only_where_it_is_as_planar_and_as_near(
+    saddle, monkeypatch, measure, first, second, taken
+):
+    """Where neither solve keeps its promises, too."""
+    surface, mesh = saddle
+    solve, solved, reports = MODULE.minimise_normal_variation, [], []
+
+    def broken(*args: Any, **kwargs: Any) -> JobResult[Level]:
+        job = solve(*args, **kwargs)
+        level = job.levels[-1]
+        after = {**level.after, measure: second if solved else first}
+        solved.append(job)
+        missed = [Promise("nothing", 0.0, 1.0)]
+        return replace(job, levels=[replace(level, after=after, promises=missed)])
+
+    def turn(report: dict[str, Any]) -> float:
+        """Less of the second."""
+        if not any(known is report for known in reports):
+            reports.append(report)
+        return 3.0 if report is reports[0] else 2.0
+
+    monkeypatch.setattr(MODULE, "minimise_normal_variation", broken)
+    monkeypatch.setattr(MODULE, "_turn", turn)
+    made, _ = planar_quads(mesh, surface)
+    assert torch.equal(made.vertices, solved[taken].vertices)
 
 
 def test_panels_at_the_boundary_do_not_grow_to_save_e():

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from torch import Tensor
 
-from ...projection import Callback, Status
+from ...projection import Callback
 from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level
+from .panels import PLANAR_PROMISE
 from .recipe import minimise_normal_variation
 
 if TYPE_CHECKING:
@@ -34,7 +35,6 @@ Panels grow by half at most: since edges of the boundary have no E, panels there
 
 _TURNED = 1.0  # degrees in the mean, beyond which edges turn too far
 _GENTLER = replace(PLANAR_QUADS, energy_weight=1.0)
-_STOPPED = (Status.INTERRUPTED, Status.CALLBACK)
 
 
 def planar_quads(
@@ -78,19 +78,30 @@ def planar_quads(
         return job, {**measure_mesh_on(job.vertices, mesh), "before_planar": mesh.report}
 
     job, report = solved(PLANAR_QUADS)
-    if _turn(report) > _TURNED and job.projection.status not in _STOPPED:
+    if _turn(report) > _TURNED and not job.stopped:
         other = solved(_GENTLER)
-        if other[0].holds >= job.holds and _is_as_near(other[0], job) and _turn(other[1]) < _turn(report):
+        if _is_as_good(other[0], job) and _turn(other[1]) < _turn(report):
             job, report = other
+        elif other[0].stopped:
+            job = _stopped_like(other[0], job)
     solve = f"{job.steps} steps towards planar polygons: {job.message}"
     said = [*mesh.notes, *job.notes, *_turned(report), solve]
     return replace(mesh, vertices=job.vertices, report=report, notes=said), job
 
 
-def _is_as_near(one: JobResult[Level], other: JobResult[Level]) -> bool:
-    """Whether a job ends as near the surface as another one, or within the limit."""
-    near, far = (float(job.after["largest_distance_relative"]) for job in (one, other))
-    return near <= max(far, PLANAR_QUADS.distance_limit or 0.0)
+def _is_as_good(one: JobResult[Level], other: JobResult[Level]) -> bool:
+    """Whether a job keeps its promises if another does, and ends as near the surface and as planar or within limits."""
+    limits = {"largest_distance_relative": PLANAR_QUADS.distance_limit or 0.0, "largest_planarity": PLANAR_PROMISE}
+    return one.holds >= other.holds and all(
+        one.after[name] <= max(other.after[name], limit) for name, limit in limits.items()
+    )
+
+
+def _stopped_like(stopped: JobResult[Level], job: JobResult[Level]) -> JobResult[Level]:
+    """A job that is the best found when the one after it was stopped, so that who asked for that is told."""
+    *levels, last = job.levels
+    end = replace(last.runs[-1], status=stopped.projection.status, message=stopped.message)
+    return replace(job, levels=[*levels, replace(last, runs=[*last.runs[:-1], end])], stopped=True)
 
 
 def _turn(report: Mapping[str, Any]) -> float:
