@@ -15,6 +15,8 @@ from .errors import MeshError
 UNREAD: Mapping[str, Any] = {"repair": False, "weld": False, "split_edges": False, "surfaces": None}
 """The arguments that have words, each with what it is without one."""
 
+_SHOWN = 40  # characters of a text that is refused
+
 
 def distance_of(text: str) -> float:
     """Within which edges are welded.
@@ -27,7 +29,7 @@ def distance_of(text: str) -> float:
     except ValueError:
         value = math.nan
     if not 0.0 <= value < math.inf:
-        raise ValueError(f"expected a distance of at least 0, got {text!r}")
+        raise ValueError(f"expected a distance of at least 0, got {_shown(text)}")
     return value
 
 
@@ -38,9 +40,18 @@ def cells_of(text: str) -> int | tuple[int, int]:
         ValueError: they are no whole numbers of at least 1.
     """
     words = text.split(",")
-    if len(words) not in (1, 2) or not all(word.isascii() and word.isdigit() and int(word) > 0 for word in words):
-        raise ValueError(f"expected whole numbers of at least 1, such as 40 or 40,20, got {text!r}")
+    if len(words) not in (1, 2) or not all(_is_count(word) for word in words):
+        raise ValueError(f"expected whole numbers of at least 1, such as 40 or 40,20, got {_shown(text)}")
     return int(words[0]) if len(words) == 1 else (int(words[0]), int(words[1]))
+
+
+def _is_count(word: str) -> bool:
+    """Python refuses to read numbers of thousands of digits, in words of its own."""
+    return word.isascii() and word.isdigit() and len(word) <= _SHOWN and int(word) > 0
+
+
+def _shown(text: str) -> str:
+    return repr(text) if len(text) <= _SHOWN else f"{text[:_SHOWN]!r}..."
 
 
 def words_of(options: Mapping[str, Any]) -> tuple[str, ...]:

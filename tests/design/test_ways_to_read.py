@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from torchfair import MeshError, load_mesh, save_mesh
-from torchfair._reading_words import options_of, words_of
+from torchfair._reading_words import cells_of, distance_of, options_of, words_of
 from torchfair.cli.command import build_parser
 from torchfair.design.command_line import command_line
 from torchfair.design.effects import Store
@@ -46,6 +47,7 @@ OTHERS = [
     "surfaces=0",
     "surfaces=1,2,3",
     "surfaces=x",
+    f"surfaces={'9' * 5000}",
 ]
 
 
@@ -53,6 +55,13 @@ OTHERS = [
 def test_other_words_are_refused(word: str) -> None:
     with pytest.raises(MeshError, match="no way to read"):
         options_of([word])
+
+
+@pytest.mark.parametrize("of", [cells_of, distance_of])
+def test_long_words_are_refused_by_a_short_sentence_of_ours(of: Callable[[str], Any]) -> None:
+    """Python has a sentence of its own for numbers of thousands of digits."""
+    with pytest.raises(ValueError, match=r"^expected .* of at least .*, got '9{40}'\.\.\.$"):
+        of("9" * 5000)
 
 
 def surfaces(path: Path, *boxes: bool) -> Path:
