@@ -110,6 +110,14 @@ class Interrupts:
         self.pending = True
 
 
+def was_interrupted(error: ImportError) -> bool:
+    """Whether Ctrl-C made an import fail: modules written in C say so by an error that has it for a cause."""
+    cause: BaseException | None = error
+    while isinstance(cause, ImportError):
+        cause = cause.__cause__ or cause.__context__
+    return isinstance(cause, KeyboardInterrupt)
+
+
 class LikeCtrlC:
     """A handler of signals that end programs: they raise KeyboardInterrupt, which waits where that of Ctrl-C waits.
 

@@ -110,6 +110,36 @@ def test_errors_while_running(
     assert capsys.readouterr().err == message
 
 
+def c_module_interrupted() -> ImportError:
+    """As modules written in C say that Ctrl-C came while they were loaded."""
+    error = ImportError("initialization failed")
+    error.__cause__ = KeyboardInterrupt()
+    return error
+
+
+def test_ctrl_c_while_a_module_written_in_c_is_loaded_on_the_way(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(arguments: object) -> int:
+        try:
+            raise c_module_interrupted()
+        except ImportError as error:
+            raise ImportError("numpy could not be loaded") from error
+
+    monkeypatch.setattr(command.measure, "run", fail)
+    assert main(["measure", "x.obj"]) == 130
+    assert capsys.readouterr().err == "torchfair measure: interrupted\n"
+
+
+def test_modules_that_cannot_be_loaded_are_not_taken_for_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(arguments: object) -> int:
+        raise ImportError("no such library") from OSError("not found")
+
+    monkeypatch.setattr(command.measure, "run", fail)
+    with pytest.raises(ImportError, match="no such library"):
+        main(["measure", "x.obj"])
+
+
 def test_programming_errors_are_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(arguments: object) -> int:
         raise KeyError("bug")
@@ -158,8 +188,9 @@ def test_a_signal_while_libraries_are_loaded_leaves_no_traceback(
     assert (done.returncode, done.stdout) == (code, "")
 
 
-def test_ctrl_c_while_the_command_line_itself_is_loaded(tmp_path: Path) -> None:
-    (tmp_path / "argparse.py").write_text("raise KeyboardInterrupt\n")
+@pytest.mark.parametrize("words", ["KeyboardInterrupt", 'ImportError("failed") from KeyboardInterrupt()'])
+def test_ctrl_c_while_the_command_line_itself_is_loaded(words: str, tmp_path: Path) -> None:
+    (tmp_path / "argparse.py").write_text(f"raise {words}\n")
     done = subprocess.run(
         [sys.executable, "-m", "torchfair", "--help"],
         capture_output=True,

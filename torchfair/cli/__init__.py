@@ -11,4 +11,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         from .command import main as run
     except KeyboardInterrupt:
         return 130
+    except ImportError as error:
+        from .._interrupts import was_interrupted
+
+        if not was_interrupted(error):
+            raise
+        return 130
     return run(argv)

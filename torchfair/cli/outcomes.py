@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from .._interrupts import was_interrupted
 from ..errors import TorchfairError
 from .errors import CommandError
 from .exit_codes import EXIT_ERROR, EXIT_INTERRUPTED, EXIT_NOT_REACHED, EXIT_OK
@@ -49,6 +50,10 @@ def outcome_of(run: Callable[[], int], name: str) -> Outcome:
     except BrokenPipeError:
         raise
     except KeyboardInterrupt:
+        return Outcome(EXIT_INTERRUPTED, "interrupted", name)
+    except ImportError as error:
+        if not was_interrupted(error):
+            raise
         return Outcome(EXIT_INTERRUPTED, "interrupted", name)
     except SystemExit as stop:  # argparse, after printing help
         return Outcome(stop.code if isinstance(stop.code, int) else EXIT_OK, name=name)
