@@ -51,8 +51,8 @@ class FairPlan(Plan):
         """All portions; where that leaves faces warped or raises E much, faces are made planar first, E lowered then.
 
         Where neither helps, they are made planar from where the planes of faces meet. The best is kept, of those within
-        the distance limit if there are any. Where none has planar faces, the start is, with E lowered as far as no face
-        is warped more than the worst one was.
+        the distance limit if there are any; the start is where it had planar faces and least E. Where none has planar
+        faces, the start is, with E lowered as far as no face is warped more than the worst one was.
         """
         problem, start = self._problem, self.state["vertices"]
         every = problem.settings.projection.takes_every_step
@@ -64,6 +64,8 @@ class FairPlan(Plan):
         first = self.state["vertices"]
         near_enough = problem.is_planar_within_limits(first)
         if near_enough and problem.energy(first) <= _LITTLE_MORE * energy:
+            if problem.energy(first) > energy and self._may_stay(start):
+                self.state = problem.blocks(start)
             return
         yield from self._made_planar(start, 0.0 if near_enough else problem.settings.planar_distance)
         found = [first, self.state["vertices"]]
@@ -83,6 +85,12 @@ class FairPlan(Plan):
                 return
         problem.takes_for_planarity(best)
         self.state = problem.blocks(best)
+
+    def _may_stay(self, start: Tensor) -> bool:
+        """Whether the start has planar faces, flat edges and all else that is asked for already."""
+        problem = self._problem
+        asked = problem.panels.are_planar(problem.placed(problem.blocks(start))) and not problem.pulls.pulled.any()
+        return asked and problem.is_planar_within_limits(start)
 
     def _lowered(self, portions: list[Portion], start: Tensor, most: float) -> Stages:
         """The portions, and planarity once more where the last one was not enough."""
