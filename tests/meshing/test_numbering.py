@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable
 
@@ -109,6 +110,34 @@ def test_quads_are_cut_so_that_the_smaller_triangle_is_as_large_as_it_can_be() -
             assert shared == diagonal
             same = triangulate(points[numbers], topology).triangles
             assert {frozenset(of) for of in cut.tolist()} == {frozenset(of) for of in same.tolist()}
+
+
+def cuts(points: list[list[float]], faces: list[list[int]]) -> set[frozenset[frozenset[int]]]:
+    """All ways in which faces are cut, wherever the first of them starts."""
+    vertices = torch.tensor([[x, y, 0.0] for x, y in points], dtype=torch.float64)
+    found = set()
+    for shift in range(len(faces[0])):
+        turned = [faces[0][shift:] + faces[0][:shift], *faces[1:]]
+        cut = triangles_by_geometry(vertices, Topology.from_faces(turned, len(vertices)))
+        found.add(frozenset(frozenset(of) for of in cut.tolist()))
+    return found
+
+
+def test_parallelograms_are_cut_along_the_shorter_diagonal() -> None:
+    (cut,) = cuts([[0, 0], [2, 0], [3, 1], [1, 1]], [[0, 1, 2, 3]])
+    assert cut == {frozenset({0, 1, 3}), frozenset({1, 2, 3})}
+
+
+def test_rectangles_are_cut_from_the_corner_that_is_farthest_from_the_middle_of_the_mesh() -> None:
+    """Sizes, diagonals and largest coordinates are the same either way."""
+    (cut,) = cuts([[0, 0], [1, 0], [1, 1], [0, 1], [-3, -0.5]], [[0, 1, 2, 3], [0, 3, 4]])
+    assert cut == {frozenset({0, 1, 2}), frozenset({0, 2, 3}), frozenset({0, 3, 4})}
+
+
+@pytest.mark.parametrize("size", [5, 6, 8])
+def test_regular_polygons_are_cut_alike_wherever_they_start(size: int) -> None:
+    angles = [2 * math.pi * k / size + 0.1 for k in range(size)]
+    assert len(cuts([[math.cos(angle), math.sin(angle)] for angle in angles], [list(range(size))])) == 1
 
 
 def test_components_keep_the_numbers_that_were_given() -> None:

@@ -12,7 +12,7 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.geometry import edge_lengths, face_areas, fitted_curvature, rings_for_noise
 from torchfair.meshing import principal_quads
-from torchfair.meshing.surface_curvature import smooth_absolute_curvature
+from torchfair.meshing.surface_curvature import _middles, smooth_absolute_curvature
 from torchfair.shapes import Catenoid, Cylinder, Enneper, PrincipalParaboloid, Torus, icosphere
 
 
@@ -35,6 +35,15 @@ def bent_strip(positions: list[float], angle: float, start: float, end: float) -
     n = len(positions)
     faces = [t for i in range(n - 1) for t in ([i, i + 1, n + i + 1], [i, n + i + 1, n + i])]
     return torch.cat(rows), Topology.from_faces(faces), torch.cat([normals, normals])
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.2])
+def test_middles_of_chords_are_lifted_onto_the_circle(angle):
+    """Up to fourth order in the angle."""
+    ends = torch.tensor([[math.cos(angle / 2), sign * math.sin(angle / 2), 0.0] for sign in (-1, 1)]).double()
+    middle = _middles(2 * ends, ends, torch.tensor([[0, 1]]))
+    exact = torch.tensor([[2.0, 0.0, 0.0]], dtype=torch.float64)
+    torch.testing.assert_close(middle, exact, atol=0.1 * angle**4, rtol=0)
 
 
 @pytest.mark.parametrize("shape", [Torus(), Catenoid(), Enneper(), PrincipalParaboloid(1.0, -0.5), Cylinder()])

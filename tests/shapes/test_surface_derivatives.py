@@ -103,3 +103,11 @@ def test_inference_and_no_grad_give_the_same_numbers(surface: Surface) -> None:
     with torch.inference_mode():
         torch.testing.assert_close(surface.normal(u, v), surface.normal(u.clone(), v.clone()))
     assert surface.principal_curvatures(u[:0], v[:0]).shape == (0, 2)
+
+
+def test_numbers_made_under_inference_have_derivatives_outside() -> None:
+    with torch.inference_mode():
+        u, v = torch.full((3,), 0.3, dtype=torch.float64), torch.linspace(0.1, 0.5, 3, dtype=torch.float64)
+    found = Torus().tangents(u, v)
+    for of, expected in zip(found, Torus().tangents(u.clone(), v.clone()), strict=True):
+        torch.testing.assert_close(of, expected)
