@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 from drawing_tools import (
@@ -20,8 +19,6 @@ from drawing_tools import (
     write_all,
 )
 from matplotlib.figure import Figure
-
-IMAGES = Path(__file__).resolve().parent / "images"
 
 
 def polylines() -> Figure:
@@ -100,4 +97,4 @@ def closest() -> Figure:
 
 
 if __name__ == "__main__":
-    write_all([polylines, boundary, closest], IMAGES)
+    write_all([polylines, boundary, closest])

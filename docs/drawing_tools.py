@@ -13,6 +13,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+IMAGES = Path(__file__).resolve().parent / "images"
+
 Point = tuple[float, float]
 
 INK, FAINT = "#1b2230", "#8a92a0"
@@ -89,10 +91,10 @@ def row(*parts: tuple[str, tuple[float, float, float, float]], inch: float = 0.6
     return figure, panels
 
 
-def write_all(drawings: Sequence[Callable[[], Figure]], images: Path) -> None:
-    """Writes drawings by their names into a folder, or as PNG into that named on the command line."""
+def write_all(drawings: Sequence[Callable[[], Figure]]) -> None:
+    """Writes drawings by their names beside the pages, or as PNG into the folder named on the command line."""
     for draw in drawings:
-        path = Path(sys.argv[1], draw.__name__ + ".png") if len(sys.argv) > 1 else images / f"{draw.__name__}.svg"
+        path = Path(sys.argv[1], draw.__name__ + ".png") if len(sys.argv) > 1 else IMAGES / f"{draw.__name__}.svg"
         save(draw(), path)
 
 

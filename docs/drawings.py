@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from drawing_tools import (
@@ -28,9 +27,6 @@ from drawing_tools import (
     write_all,
 )
 from matplotlib.figure import Figure
-
-IMAGES = Path(__file__).resolve().parent / "images"
-
 
 # ---- edges ---------------------------------------------------------------------------------------------
 
@@ -274,4 +270,4 @@ DRAWINGS: list[Callable[[], Figure]] = [
 
 
 if __name__ == "__main__":
-    write_all(DRAWINGS, IMAGES)
+    write_all(DRAWINGS)

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from drawing_tools import BLUE, FAINT, GREEN, INK, RED, mean_of, polar, ring_of, row, write_all
 from matplotlib.figure import Figure
-
-IMAGES = Path(__file__).resolve().parent / "images"
 
 
 def constraints() -> Figure:
@@ -114,4 +111,4 @@ DRAWINGS: list[Callable[[], Figure]] = [constraints, reweighting, inequality]
 
 
 if __name__ == "__main__":
-    write_all(DRAWINGS, IMAGES)
+    write_all(DRAWINGS)

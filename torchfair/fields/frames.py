@@ -88,6 +88,12 @@ class FaceFrames:
             inside = np.asarray(near[self.triangles].any(1))
         return inside
 
+    def at_vertices(self, values: Floats) -> Floats:
+        """(V,) means of values (F,) of the triangles around; 0 where there are none."""
+        corners, size = self.triangles.ravel(), len(self.points)
+        counts = np.bincount(corners, minlength=size)
+        return np.asarray(np.bincount(corners, np.repeat(values, 3), size) / np.maximum(counts, 1))
+
     def seen(self, vectors: Floats, faces: Ints) -> Complexes:
         """(n, ...) vectors (n, ..., 3) in the frames of faces (n,), as complex numbers."""
         apart = (len(faces), *[1] * (vectors.ndim - 2), 3)

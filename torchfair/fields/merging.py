@@ -51,10 +51,7 @@ def merge_singularities(
     Returns:
         Angles (F,) and matchings (I,); those given, where nothing is to be merged.
     """
-    corners, size = frames.triangles.ravel(), len(frames.points)
-    trust = np.bincount(corners, np.repeat(directions.confidence, 3), size) / np.maximum(
-        np.bincount(corners, minlength=size), 1
-    )
+    trust = frames.at_vertices(directions.confidence)
     moved, touched = _split(frames, matched, vertex_charges(frames, angles, matched), trust, radius, symmetry)
     for _ in range(_ROUNDS):
         charges = vertex_charges(frames, angles, moved)

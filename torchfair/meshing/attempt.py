@@ -115,11 +115,12 @@ def attempt(
         cells = trace_cells(found, off_the_lines(found, runs, lines), corners & ~graph.nodes, lines)
         near = spacings[KDTree(frames.centres).query(cells.positions)[1]] if surface.sizes else spacings[:1]
         whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1)))
-        made = verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
-        verify_creases(made, whole.creases, creases)
+        faces, size, shape = whole.faces, len(whole.positions), shape_of(surface.topology)
+        verify_creases(verified_topology(faces, size, shape), whole.creases, creases)
         rows = _rows(cells, whole)
-        faces = cut_cells(whole.positions, whole.faces, rows) if lattice.has_rows else whole.faces
-        verified_topology(faces, len(whole.positions), shape_of(surface.topology))
+        if lattice.has_rows:
+            faces = cut_cells(whole.positions, faces, rows)
+            verified_topology(faces, size, shape)
         verify_corners(whole.positions, faces)
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None

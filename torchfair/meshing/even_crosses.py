@@ -50,7 +50,7 @@ def even_crosses(
     ends = [np.array([vertex]) for vertex in np.flatnonzero(charges % 2)] + loops
     if len(ends) < 2:
         return angles, matched
-    trust = _at_vertices(frames, directions.confidence)
+    trust = frames.at_vertices(directions.confidence)
     lengths, before = _shortest_paths(frames, ends, weight + trust)
     rank = trust if stay is None else np.where(stay, -1.0, trust)
     steps: list[tuple[int, int, int]] = []
@@ -114,10 +114,3 @@ def _path(before: Ints, lengths: Floats, end: Ints) -> Ints:
     while before[path[-1]] >= 0:
         path.append(int(before[path[-1]]))
     return np.array(path[::-1])
-
-
-def _at_vertices(frames: FaceFrames, values: Floats) -> Floats:
-    """(V,) means of values (F,) of the triangles around."""
-    corners, size = frames.triangles.ravel(), len(frames.points)
-    counts = np.bincount(corners, minlength=size)
-    return np.asarray(np.bincount(corners, np.repeat(values, 3), size) / np.maximum(counts, 1))

@@ -76,7 +76,7 @@ class FairPlan(Plan):
             found.append(self.state["vertices"])
             planar = [found[-1]] if problem.largest_warp(found[-1]) <= PLANAR_PROMISE else []
         if planar:
-            best = min(planar, key=lambda found: (not problem.is_planar_within_limits(found), problem.energy(found)))
+            best = min(planar, key=lambda mesh: (not problem.is_planar_within_limits(mesh), problem.energy(mesh)))
         else:
             best = min(found, key=problem.largest_warp)
             if problem.largest_warp(best) > _WORTHWHILE * warp:

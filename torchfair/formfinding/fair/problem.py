@@ -191,10 +191,7 @@ class FairProblem:
 
     def is_planar_within_limits(self, vertices: Tensor) -> bool:
         """Whether the faces of ``vertices`` (V, 3) are planar as promised, within the limits of the start."""
-        limits = self.near.limits
-        if self.largest_warp(vertices) > PLANAR_PROMISE:
-            return False
-        return limits is None or not bool((self.near.distances(self.placed({"vertices": vertices})) > limits).any())
+        return self.largest_warp(vertices) <= PLANAR_PROMISE and not self._leaves_limits(vertices)
 
     def where_planes_meet(self, vertices: Tensor) -> Tensor | None:
         """A start (V, 3) nearer to planar faces, far off within the tangent planes; None if it breaks bounds."""
@@ -205,9 +202,11 @@ class FairProblem:
             self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
         ):
             return None
-        if not self.settings.planar_distance and self.near.limits is not None:
-            return None if bool((self.near.distances(self.placed(trial)) > self.near.limits).any()) else moved
-        return moved
+        return None if not self.settings.planar_distance and self._leaves_limits(moved) else moved
+
+    def _leaves_limits(self, vertices: Tensor) -> bool:
+        limits = self.near.limits
+        return limits is not None and bool((self.near.distances(self.placed({"vertices": vertices})) > limits).any())
 
     def energy(self, vertices: Tensor) -> float:
         """E, with gliding ``vertices`` (V, 3) put in place."""
