@@ -54,9 +54,10 @@ from torchfair.linear import (
     System,
 )
 from torchfair.projection import GuidedProjection, IterationRecord, ProjectionSettings
+from torchfair.projection.evaluation import Evaluation
 from torchfair.projection.linear_system import LinearSystem
 from torchfair.projection.proposal import descend
-from torchfair.projection.system import Evaluation, Structure
+from torchfair.projection.system import Structure
 
 PARTS = ("jacobian", "assembly", "factor", "solve", "merit", "other", "whole")
 COLUMNS = (*PARTS, "corrected")

@@ -37,7 +37,7 @@ from torus_problem import SMOOTHING, torus_problem
 import torchfair
 from torchfair.linear import RslabDirect
 from torchfair.projection import GuidedProjection, ProjectionSettings
-from torchfair.projection.system import Evaluation
+from torchfair.projection.evaluation import Evaluation
 
 TARGET = 0.5
 LSMR = {"SciPy": {}, "SciPy, LSMR <= 50": {"maxiter": 50}}

@@ -8,12 +8,13 @@ import torch
 
 from ..errors import TorchfairError
 from .declarations import check_declarations
+from .evaluation import Evaluation
 from .layout import State
 from .linear_system import LinearSystem
 from .loss import apply_root
 from .result import TermResidual
 from .start_checks import check_finite, check_merit, check_origin, first_bad_elements, rows
-from .system import Evaluation, Structure
+from .system import Structure
 from .term import ElementTerm
 
 

@@ -16,7 +16,8 @@ from .portions import portions
 from .row_pattern import RowPattern
 
 if TYPE_CHECKING:
-    from .system import Evaluation, Structure
+    from .evaluation import Evaluation
+    from .system import Structure
 
 
 class LinearSystem:
@@ -109,14 +110,21 @@ class LinearSystem:
 
     def changes(self, step: Tensor) -> tuple[list[Tensor], Tensor | None]:
         """By how much a step (N,) changes the residuals of the model: of each term (m, n), and of the linear terms."""
-        terms = []
-        for number, (compiled, jacobian) in enumerate(zip(self.structure.compiled, self.jacobians, strict=True)):
-            chosen, parts = self.felt[number], []
-            for elements in portions(jacobian.shape[2], jacobian):
-                unknowns = compiled.unknowns_of(elements if chosen is None else chosen[elements])
-                parts.append(torch.einsum("mkn,kn->mn", jacobian[..., elements], step[unknowns]))
-            terms.append(self._of_all(number, parts[0] if len(parts) == 1 else torch.cat(parts, 1)))
+        terms = [self._change(number, step) for number in range(len(self.jacobians))]
         return terms, None if self.structure.affine is None else self.structure.affine.change(step)
+
+    def rises(self, number: int, step: Tensor) -> Tensor:
+        """(n,) by how much a step (N,) raises the shares of the elements of a term in the merit of the model."""
+        change = self._change(number, step)
+        return (change * (self.residuals[number] + 0.5 * change)).sum(0)
+
+    def _change(self, number: int, step: Tensor) -> Tensor:
+        compiled, jacobian = self.structure.compiled[number], self.jacobians[number]
+        chosen, parts = self.felt[number], []
+        for elements in portions(jacobian.shape[2], jacobian):
+            unknowns = compiled.unknowns_of(elements if chosen is None else chosen[elements])
+            parts.append(torch.einsum("mkn,kn->mn", jacobian[..., elements], step[unknowns]))
+        return self._of_all(number, parts[0] if len(parts) == 1 else torch.cat(parts, 1))
 
     def predicted_fall(self, step: Tensor) -> Tensor:
         """(members,) by how much the merit of the linearised residuals falls with a step (N,)."""

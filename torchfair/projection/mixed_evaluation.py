@@ -5,8 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .evaluation import Evaluation
 from .portions import Arguments
-from .system import Evaluation, Structure
+from .system import Structure
 
 
 def with_members(

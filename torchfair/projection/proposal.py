@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from ..linear import Descending, Factor, LinearSolver, Solution
+from .evaluation import Evaluation
 from .linear_system import LinearSystem
-from .system import Evaluation
 
 
 @dataclass(frozen=True)

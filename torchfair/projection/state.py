@@ -10,11 +10,11 @@ from torch import Tensor
 from ..linear import LinearSolver
 from ..settings.projection_settings import ProjectionSettings
 from .course import Course
+from .evaluation import Evaluation
 from .inequalities import Inequalities
 from .linear_system import LinearSystem
 from .proposal import Proposal
 from .result import Status
-from .system import Evaluation
 
 
 @dataclass(frozen=True)

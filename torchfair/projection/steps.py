@@ -22,6 +22,7 @@ from .course import Course, Outcome, Standing
 from .damped_solution import propose
 from .damping import ConstantDamping, Damping
 from .evaluate import check_linearised, check_start
+from .evaluation import Evaluation
 from .inequalities import Inequalities
 from .layout import State
 from .portions import are_many
@@ -29,7 +30,6 @@ from .problem import Problem
 from .result import IterationRecord, Status
 from .state import Linearised, ProjectionState
 from .stopwatch import Stopwatch
-from .system import Evaluation
 from .trials import Guard, Trials
 from .vanishing import vanishing
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -15,6 +14,7 @@ from ..linear import LowerTriangle
 from .affine import AffinePart
 from .block_diagonal import BlockDiagonal
 from .compiled import CompiledTerm
+from .evaluation import Evaluation, Seen, seen
 from .layout import Layout, State
 from .linear_system import LinearSystem
 from .loss import apply_root, is_one_sided
@@ -25,24 +25,6 @@ from .repeated_pattern import RepeatedPattern
 from .replicate import first_members
 from .row_pattern import RowPattern
 from .term import ElementTerm
-
-
-class Evaluation(NamedTuple):
-    """A state with its residuals.
-
-    Attributes:
-        state: The blocks.
-        merits: (members,) sums of all terms, one for each member of a batch; infinity where a residual is not finite,
-            so that such a state is never accepted.
-        arguments, values: Of each term of ``Structure.compiled``, unscaled; arguments are gathered when asked for.
-        affine: Scaled residuals of the linear terms.
-    """
-
-    state: State
-    merits: Tensor
-    arguments: list[Arguments]
-    values: list[Tensor]
-    affine: Tensor | None
 
 
 class Structure:
@@ -204,8 +186,12 @@ class Structure:
 
     def evaluate(self, state: State) -> Evaluation:
         """Residuals and merit of a state."""
+        return self.summed(state, [seen(compiled.term, state) for compiled in self.compiled])
+
+    def summed(self, state: State, terms: Sequence[Seen]) -> Evaluation:
+        """The evaluation of a state of which all terms have been seen."""
         affine = None if self.affine is None else self.affine.residual(self.layout.flatten(state))
-        return self._evaluated(state, [compiled.term for compiled in self.compiled], self.layout.members, affine)
+        return self._summed(state, terms, self.layout.members, affine)
 
     def evaluate_members(self, flat: Tensor, chosen: list[int]) -> Evaluation:
         """Residuals and merits of some members of a batch alone; those of linear terms for all of them.
@@ -217,28 +203,19 @@ class Structure:
         blocks = self.layout.unflatten(self.layout.chosen_members(flat, chosen), len(chosen))
         affine = None if self.affine is None else self.affine.residual(flat)
         terms = [first_members(c.term, c.term.num_elements // self.layout.members * len(chosen)) for c in self.compiled]
-        return self._evaluated(blocks, terms, len(chosen), affine, chosen)
+        return self._summed(blocks, [seen(term, blocks) for term in terms], len(chosen), affine, chosen)
 
-    def _evaluated(
-        self,
-        state: State,
-        terms: Sequence[ElementTerm],
-        count: int,
-        affine: Tensor | None,
-        chosen: list[int] | None = None,
+    def _summed(
+        self, state: State, terms: Sequence[Seen], count: int, affine: Tensor | None, chosen: list[int] | None = None
     ) -> Evaluation:
-        arguments, values, parts = [], [], [self.like.new_zeros(count)]
-        for term in terms:
-            arguments.append(term.arguments_at(state))
-            values.append(term.values(arguments[-1]))
-            contributions = term.contributions(arguments[-1], values[-1])
-            parts.append(contributions.view(count, -1).sum(1).to(self.like))
+        parts = [self.like.new_zeros(count)]
+        parts += [term.contributions.view(count, -1).sum(1).to(self.like) for term in terms]
         if self.affine is not None and affine is not None:
             own = 0.5 * self.affine.member_sums(affine.square(), self.layout.members)
             parts.append(own if chosen is None else own[chosen])
         merits = torch.stack(parts).sum(0)
         merits = torch.where(torch.isfinite(merits), merits, torch.inf)
-        return Evaluation(state, merits, arguments, values, affine)
+        return Evaluation(state, merits, [term.arguments for term in terms], [term.values for term in terms], affine)
 
     def unknowns_of_infinite_elements(self, at: Evaluation) -> Tensor:
         """(N,) bool: unknowns of elements whose share of the merit is not finite."""

@@ -9,13 +9,15 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from .attempts import Attempts, Spoilt
+from .evaluation import Evaluation
 from .layout import State
 from .mixed_evaluation import with_members
+from .portions import are_many
 from .problem import Problem
 from .proposal import Proposal
 from .state import ProjectionState
 from .stopwatch import Stopwatch
-from .system import Evaluation
 
 Guard = Callable[[State, State], bool]
 
@@ -55,6 +57,7 @@ class Trials:
         ]
         self._promised: list[float] = proposal.predicted.tolist()
         self._best, self._change = state.evaluation, torch.zeros_like(self._start)
+        self._attempts: Attempts | None = None
         self.merits = [course.merit for course in state.courses]
         self.gains = [-math.inf for _ in state.courses]
         self.taken = [False for _ in state.courses]
@@ -144,6 +147,8 @@ class Trials:
         that they do not stop all others.
         """
         structure, system, promised = self._problem.structure, self._proposal.system, self._promised
+        if len(self.merits) == 1 and are_many(self._problem.layout.num_unknowns):
+            return self._unspoilt(change)
         whole = change
         every = range(len(self.merits))
         if len(seen) < len(every):
@@ -168,6 +173,30 @@ class Trials:
         trial, promised = self._evaluate(change), system.predicted_fall(change).tolist()
         return _Tried(trial, change, every, trial.merits.tolist(), promised)
 
+    def _unspoilt(self, whole: Tensor) -> _Tried | None:
+        """What the step of a large problem leads to, with that of unknowns halved whose elements spoil it."""
+        attempts = self._attempts or Attempts(self._state.evaluation, self._proposal)
+        self._attempts = attempts
+        change, left = whole, _HALVINGS
+        while left:
+            with self._watch.part("merit"):
+                trial = attempts.evaluated(self._at(change))
+                if isinstance(trial, Evaluation):
+                    return self._of_large(trial, change, whole)
+                spoilt: Spoilt | None = trial
+                while spoilt is not None and left:
+                    change, left = torch.where(spoilt.unknowns, 0.5 * change, change), left - 1
+                    spoilt = attempts.spoilt(self._at(change), spoilt.terms)
+        return self._of_large(self._evaluate(change), change, whole)
+
+    def _of_large(self, trial: Evaluation, change: Tensor, whole: Tensor) -> _Tried | None:
+        promised = self._promised if change is whole else self._proposal.system.predicted_fall(change).tolist()
+        merits = trial.merits.tolist()
+        if not math.isfinite(merits[0]):
+            return self._shorter(whole)
+        tried = _Tried(trial, change, range(1), merits, promised)
+        return tried if promised[0] > 0.0 else self._shorter(whole) or tried
+
     def _shorter(self, change: Tensor) -> _Tried | None:
         """What a step leads to that is shortened as a whole until all members are finite; None if none is.
 
@@ -185,6 +214,9 @@ class Trials:
 
     def _admits(self, trial: State) -> bool:
         return self._guard is None or self._guard(self._state.evaluation.state, trial)
+
+    def _at(self, change: Tensor) -> State:
+        return self._problem.layout.unflatten(self._start + change)
 
     def _evaluate(self, change: Tensor, seen: Sequence[int] | None = None) -> Evaluation:
         flat, structure = self._start + change, self._problem.structure
