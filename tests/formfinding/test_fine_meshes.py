@@ -12,6 +12,7 @@ from torchfair.formfinding.fair import scales as of_fairness
 from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.formfinding.job.pulls import Pulls
 from torchfair.geometry import edge_lengths
+from torchfair.projection import SmoothAbsolute
 from torchfair.shapes import PrincipalParaboloid, icosphere, irregular_triangles
 
 
@@ -19,7 +20,7 @@ def factors(vertices: torch.Tensor, topology: object) -> tuple[float, float]:
     """Of smoothing and fairness of a mesh in its mean edge length."""
     vertices = vertices / edge_lengths(vertices, topology).mean()
     job = FairProblem(vertices, topology, None, Pulls(vertices), FairSettings())
-    return job.smoothing_scale, job.fairness_scale
+    return job.scales.smoothing, job.scales.fairness
 
 
 def test_coarse_meshes_are_left_alone_and_fine_ones_fall_in_proportion() -> None:
@@ -54,6 +55,32 @@ def test_they_lower_the_energy_of_a_shallow_saddle(bound: str, monkeypatch: pyte
     scaled = reached()
     monkeypatch.setattr(of_fairness, bound, 1e-9)
     assert scaled < 0.99 * reached()
+
+
+def test_blunt_stages_of_large_meshes_are_no_blunter_than_a_quarter_of_the_mean(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mesh = icosphere(3)
+    vertices = mesh.vertices / edge_lengths(mesh.vertices, mesh.topology).mean()
+    mean = float(normal_variation_per_edge(vertices, mesh.topology).mean())
+
+    def smoothing(blur: float) -> float:
+        job = FairProblem(vertices, mesh.topology, None, Pulls(vertices), FairSettings(smoothing=0.01))
+        (term,) = (term for term in job.terms(1.0, blur) if term.name == "normal variation")
+        assert isinstance(term.loss, SmoothAbsolute)
+        return term.loss.epsilon
+
+    sharp = smoothing(1.0)
+    assert 0.04 * mean < sharp < 0.25 * mean
+    assert smoothing(10.0) == pytest.approx(10.0 * sharp)
+    monkeypatch.setattr(of_fairness, "_LARGE", len(vertices) + 1)
+    assert smoothing(10.0) == pytest.approx(10.0 * sharp)
+    monkeypatch.setattr(of_fairness, "_LARGE", len(vertices))
+    assert smoothing(10.0) == pytest.approx(0.25 * mean)
+    assert smoothing(1.5) == pytest.approx(1.5 * sharp)
+    assert smoothing(1.0) == sharp
+    monkeypatch.setattr(of_fairness, "_BLUNT", 1e-9)
+    assert smoothing(10.0) == sharp
 
 
 def fairness_weight(job: FairProblem, blur: float) -> float:

@@ -25,7 +25,7 @@ from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
 from .panels import PLANAR_PROMISE, Panels
-from .scales import scales
+from .scales import Scales, scales
 from .terms import fair_terms, planar_terms
 
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
@@ -49,7 +49,7 @@ class FairProblem:
     Attributes:
         near: Closeness to the reference surface.
         bounds: On corner angles and areas of faces.
-        smoothing_scale: By which the smoothing of the settings is multiplied: below 1 where the mesh is fine.
+        scales: Of smoothing and fairness where the mesh is fine.
         input_edge: Mean edge length of the input.
         curves: Along boundary and creases.
         corners: (V,) bool, where the boundary turns.
@@ -81,9 +81,7 @@ class FairProblem:
         self.input_edge, self.curves = input_edge, rim or feature_curves(vertices, topology, settings)
         self.corners = self.curves.rim.corners
         self._tell_of_creases()
-        self.smoothing_scale, self._fairness_scale = 1.0, 1.0
-        if not settings.projection.takes_every_step:
-            self.smoothing_scale, self._fairness_scale = scales(vertices, topology)
+        self.scales = Scales() if settings.projection.takes_every_step else scales(vertices, topology)
         self.bounds = FaceBounds(vertices, topology, pulls)
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
@@ -124,7 +122,7 @@ class FairProblem:
     @property
     def fairness_scale(self) -> float:
         """By which the weight of fairness is multiplied in the last stage; 1 where handles leave the reference."""
-        return 1.0 if self.near.design_mode else self._fairness_scale
+        return 1.0 if self.near.design_mode else self.scales.fairness
 
     def snapshot(self) -> Callable[[], None]:
         """A function that puts back what handles have changed."""

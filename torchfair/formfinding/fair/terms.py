@@ -60,7 +60,7 @@ def planar_terms(problem: FairProblem, share: float) -> list[ElementTerm]:
 def _energy(problem: FairProblem, blur: float) -> list[ElementTerm]:
     settings, topology = problem.settings, problem.topology
     if settings.formulation == "reduced":
-        smoothing = blur * settings.smoothing * problem.smoothing_scale
+        smoothing = problem.scales.smoothed(settings.smoothing, blur)
         return c.normal_variation_terms(topology, smoothing=smoothing, weight=settings.energy_weight)
     planar = topology.face_sizes == 3
     planar[problem.panels.planar] = True
