@@ -46,8 +46,23 @@ def test_edges_in_one_plane_and_parallel_ones_exclude_nothing() -> None:
     assert bool(planes_may_show(parallel[None] / math.sqrt(1.01), patterns).all())
 
 
+@pytest.mark.parametrize("gap", [1e-9, 1e-13, 1e-16])
+def test_two_edges_that_are_nearly_one_exclude_no_pattern_of_planes_but_most_others(gap: float) -> None:
+    """The plane through both is rounding; those through one of them and another edge tell as much."""
+    arms = random_arms(30, 7, seed=3, height=0.5)
+    arms[:, 1] = arms[:, 2] + gap * np.random.default_rng(1).normal(size=(30, 3))
+    unit = torch.from_numpy(arms / np.linalg.norm(arms, axis=2, keepdims=True))
+    patterns = four_run_patterns(7).signs
+    heights = torch.einsum("pc,nkc->npk", torch.from_numpy(directions(20_000)), unit)
+    shown = torch.stack([((heights * row) > 0).all(2).any(1) for row in patterns], dim=1)
+    may = planes_may_show(unit, patterns)
+    assert not bool((shown & ~may).any())
+    if gap > 1e-15:  # else both may be the same, whose plane excludes nothing
+        assert int(may.sum()) < patterns.shape[0] * 30 / 2
+
+
 @pytest.mark.parametrize("valence", [5, 6, 7, 8])
-@pytest.mark.parametrize("height", [0.5, 1e-3, 1e-7, 1e-9])
+@pytest.mark.parametrize("height", [0.5, 1e-3, 1e-7, 1e-9, 1e-13, 1e-16])
 def test_classes_are_those_of_trying_every_pattern(
     valence: int, height: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

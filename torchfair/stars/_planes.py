@@ -9,7 +9,6 @@ from ..geometry._ops import cross, dot
 from ._patterns import count_changes
 
 _TIE = 1e-9
-_PARALLEL = 1e-12
 _DOUBT = 1e-8  # heights of unit arms over a plane that may be of either sign
 _RATIOS = (1.0, 1e-3, 1e3)
 
@@ -33,8 +32,7 @@ def planes_may_show(arms: Tensor, patterns: Tensor) -> Tensor:
     x, y, z = (axis.contiguous() for axis in arms.permute(2, 1, 0))  # (k, n) each
     (ax, ay, az), (bx, by, bz) = ([axis.index_select(0, side) for axis in (x, y, z)] for side in (first, second))
     normals = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]  # (pairs, n) each
-    least = (normals[0] ** 2 + normals[1] ** 2 + normals[2] ** 2).sqrt()
-    least = torch.where(least > _PARALLEL, _DOUBT * least, torch.nan)  # parallel edges: nothing is excluded
+    least = _DOUBT * (normals[0] ** 2 + normals[1] ** 2 + normals[2] ** 2).sqrt()  # 0, as all heights, if parallel
     above, below = (torch.zeros_like(least, dtype=torch.int16) for _ in range(2))
     for arm in range(size):
         height = normals[0] * x[arm] + normals[1] * y[arm] + normals[2] * z[arm]
