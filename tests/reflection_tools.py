@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 import torch
 from helpers import DOUBLE
 from torch import Tensor
@@ -12,7 +13,7 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.cameras import Camera, OrthographicCamera, PerspectiveCamera
 from torchfair.geometry import face_normals, vertex_normals
-from torchfair.reflection import Stripes, mirror_directions
+from torchfair.reflection import Stripes, cone_directions, mirror_directions
 from torchfair.triangulation import triangulate
 
 STRIPES = Stripes(torch.tensor([[1.0, 0.3, 0.2], [0.1, -0.4, 1.0]]), 1.0, 2.0)
@@ -20,6 +21,9 @@ EACH_KIND: dict[str, type[OrthographicCamera] | type[PerspectiveCamera]] = {
     "parallel": OrthographicCamera,
     "perspective": PerspectiveCamera,
 }
+VIEWS = cone_directions(torch.tensor([0.3, 0.2, -1.0], dtype=DOUBLE), 120, 3)
+
+each_kind = pytest.mark.parametrize("kind", EACH_KIND.values(), ids=EACH_KIND)
 
 
 def vector(*numbers: float) -> Tensor:

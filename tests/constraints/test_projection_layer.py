@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any, get_type_hints
+from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 import torch
 from helpers import DOUBLE, wavy_grid
+from layer_cases import NODES, SETTINGS, Case, judged, several_blocks, slopes, solved_again
 from torch import Tensor
 
 from torchfair import Topology
@@ -22,29 +22,10 @@ from torchfair.constraints import (
     planarity_terms,
     sphere_blocks,
 )
-from torchfair.errors import DerivativeError, SettingsError, ShapeError
-from torchfair.formfinding import FairRecipe, JobLayer
+from torchfair.errors import ShapeError
 from torchfair.principal import principal_edges_of_lattice
-from torchfair.projection import BackwardRule, ElementTerm, OneSided, ProjectionLayer, ProjectionSettings
-from torchfair.projection.implicit import BackwardOptions
+from torchfair.projection import ElementTerm, OneSided, ProjectionLayer
 from torchfair.shapes import Catenoid, principal_triangles
-
-Terms = Callable[[Mapping[str, Tensor]], Sequence[ElementTerm]]
-SETTINGS = ProjectionSettings(max_iterations=300)
-NODES = torch.arange(3)[:, None]
-
-
-@dataclass(frozen=True)
-class Case:
-    """A start, what is solved for, and the parameters that it depends on."""
-
-    blocks: dict[str, Tensor]
-    terms: Terms
-    parameters: dict[str, Tensor]
-    fixed: Mapping[str, Tensor] | None = None
-
-    def layer(self, **options: object) -> ProjectionLayer:
-        return ProjectionLayer(self.blocks, self.terms, fixed=self.fixed, settings=SETTINGS, **options)
 
 
 def near(vertices: Tensor, weight: float) -> ElementTerm:
@@ -143,21 +124,6 @@ def limits(most: float) -> Case:
     return Case({"x": start}, terms, {"targets": start + 0.5, "tops": torch.full((3, 1), most, dtype=DOUBLE)})
 
 
-def several_blocks() -> Case:
-    points = torch.linspace(0.0, 1.0, 9, dtype=DOUBLE).view(3, 3).sin()
-    blocks = {"points": points, "lengths": torch.ones(3, 1, dtype=DOUBLE)}
-
-    def terms(given):
-        both = [("points", NODES), ("lengths", NODES)]
-        return [
-            ElementTerm("length", lambda x, s: x[0].square().sum() - s[0, 0] ** 2, both, weight=2.0),
-            ElementTerm("place", lambda x, t: x[0] - t, [("points", NODES)], data=(given["places"],)),
-            ElementTerm("size", lambda s, t: s[0] - t, [("lengths", NODES)], data=(given["sizes"],)),
-        ]
-
-    return Case(blocks, terms, {"places": points + 0.3, "sizes": torch.ones(3, 1, dtype=DOUBLE)})
-
-
 def principal_symmetric() -> Case:
     """Handles of a lattice whose stars lie on spheres: vertices, and normals and curvatures of the spheres."""
     mesh = principal_triangles(Catenoid(), 5, 6, ends="zigzag")
@@ -192,48 +158,6 @@ CASES: dict[str, Callable[[], Case]] = {
 every = pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 
 
-def wave(like: Tensor, phase: float) -> Tensor:
-    return torch.linspace(0.0, 5.0, like.numel(), dtype=like.dtype).add(phase).cos().view_as(like)
-
-
-def judged(blocks: Mapping[str, Tensor]) -> Tensor:
-    """Some number that depends on all unknowns, bent so that it differs from its linear part."""
-    return sum(((wave(block, 0.3) * block).sum() + block.square().sum() for block in blocks.values()), torch.zeros(()))
-
-
-def varied(case: Case, step: float) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-    """Start and parameters moved: of the start only what is fixed."""
-    fixed = case.fixed or {}
-    blocks = {
-        name: block + step * wave(block, 1.0) * fixed.get(name, torch.zeros(len(block), dtype=torch.bool))[:, None]
-        for name, block in case.blocks.items()
-    }
-    return blocks, {name: value + step * wave(value, 2.0) for name, value in case.parameters.items()}
-
-
-def slopes(case: Case, **options: object) -> tuple[Tensor, Any]:
-    """The derivative along the variation by the backward pass."""
-    blocks, parameters = varied(case, 0.0)
-    leaves = [value.requires_grad_() for value in (*blocks.values(), *parameters.values())]
-    found, info = case.layer(**options)(blocks, parameters)
-    gradients = torch.autograd.grad(judged(found), leaves)
-    ahead, behind = varied(case, 1.0), varied(case, -1.0)
-    moved = [0.5 * (a - b) for part in (0, 1) for a, b in zip(ahead[part].values(), behind[part].values(), strict=True)]
-    return sum((g * m).sum() for g, m in zip(gradients, moved, strict=True)), info
-
-
-def solved_again(case: Case, step: float) -> Tensor:
-    """The central difference of whole solves, polished."""
-    layer, sides = case.layer(tolerance=1e-11), []
-    for sign in (1.0, -1.0):
-        blocks, parameters = varied(case, sign * step)
-        for value in (*blocks.values(), *parameters.values()):
-            value.requires_grad_()  # only then ends are polished
-        found, _ = layer(blocks, parameters)
-        sides.append(judged(found).detach())
-    return (sides[0] - sides[1]) / (2 * step)
-
-
 @every
 def test_implicit_derivatives_are_those_of_solving_again(case: Callable[[], Case]) -> None:
     made = case()
@@ -256,20 +180,6 @@ def test_unrolled_steps_tend_to_the_implicit_derivative(case: Callable[[], Case]
     errors = [float(abs(slopes(made, backward="unroll", unrolled_steps=n)[0] - exact)) for n in (2, 40)]
     assert errors[0] > 100.0 * errors[1]
     assert errors[1] < 1e-6 * abs(exact)
-
-
-def test_unrolled_steps_that_move_away_are_refused() -> None:
-    """The residual itself, not its slope, is what bends this merit: by more than twice what its model knows."""
-    node = torch.tensor([[0]])
-
-    def bowl(given):
-        pull = ElementTerm("pull", lambda x, p: x[0] - p, [("x", node)], data=(given["p"],), weight=0.5)
-        return [ElementTerm("bowl", lambda x: x[0].square() + 1.0, [("x", node)]), pull]
-
-    made = Case({"x": torch.full((1, 1), 0.5, dtype=DOUBLE)}, bowl, {"p": torch.full((1, 1), 0.5, dtype=DOUBLE)})
-    torch.testing.assert_close(slopes(made)[0], solved_again(made, 1e-5), rtol=1e-6, atol=1e-8)
-    with pytest.raises(DerivativeError, match=r"Gauss-Newton steps move away.*'implicit'"):
-        slopes(made, backward="unroll", unrolled_steps=40)
 
 
 @pytest.mark.parametrize("case", [several_blocks, lambda: limits(0.6)])
@@ -344,84 +254,3 @@ def test_batches_are_members() -> None:
     assert {name: tuple(block.shape) for name, block in nothing.items()} == {"points": (0, 3, 3), "lengths": (0, 3, 1)}
     with pytest.raises(ShapeError, match="all with one leading batch dimension"):
         layer(starts, made.parameters | {"sizes": parameters["sizes"][:2]})
-
-
-def well(given: Mapping[str, Tensor]) -> list[ElementTerm]:
-    """A double well, at the top between both: least at -1 and 1."""
-    return [
-        ElementTerm(
-            "well", lambda x, p: x[0] ** 2 - 1.0 + p, [("x", torch.tensor([[0]]))], data=(given["p"],), weight=1.0
-        )
-    ]
-
-
-TOP = {"x": torch.zeros(1, 1, dtype=DOUBLE)}
-NOTHING = torch.zeros(1, 1, dtype=DOUBLE)
-
-
-def early(given: Mapping[str, Tensor]) -> list[ElementTerm]:
-    return [replace(well(given)[0], residual=lambda x, p: x[0].exp() - 2.0 + p)]
-
-
-def test_faults_name_the_condition_that_fails() -> None:
-    ahead = {"x": torch.full((1, 1), 3.0, dtype=DOUBLE)}
-    few = ProjectionSettings(max_iterations=1)
-    with pytest.raises(DerivativeError, match=r"curvature of the merit is not positive.*weak term"):
-        at_the_top()
-    with pytest.raises(DerivativeError, match="gradient is not small: after 0 Newton steps"):
-        ProjectionLayer(TOP, early, settings=few, newton_steps=0)(ahead, {"p": NOTHING.clone().requires_grad_()})
-    found, info = ProjectionLayer(TOP, early, settings=few)(ahead, {"p": NOTHING.clone().requires_grad_()})
-    assert info.point.steps > 1  # polished to the minimum
-    assert found["x"].item() == pytest.approx(torch.tensor(2.0).log().item())
-
-
-def at_the_top() -> None:
-    """Not one step is taken, so that the solve stays at the top."""
-    layer = ProjectionLayer(TOP, well, settings=ProjectionSettings(max_iterations=0))
-    layer({"x": TOP["x"] + 1e-3}, {"p": NOTHING.clone().requires_grad_()})
-
-
-def test_faults_may_be_warnings() -> None:
-    layer = ProjectionLayer(TOP, well, settings=ProjectionSettings(max_iterations=0), on_fault="gauss-newton")
-    p = NOTHING.clone().requires_grad_()
-    with pytest.warns(UserWarning, match="not positive.*Gauss-Newton matrix is used"):
-        found, info = layer({"x": TOP["x"] + 1e-3}, {"p": p})
-    found["x"].sum().backward()
-    # J = 2 x, so -(J^T J)^-1 J^T dr/dp = -1 / (2 x).
-    assert float(p.grad) == pytest.approx(-500.0, rel=1e-6)
-    assert info.point.fault
-
-
-def test_second_derivatives_are_refused() -> None:
-    made = several_blocks()
-    given = {name: value.clone().requires_grad_() for name, value in made.parameters.items()}
-    found, _ = made.layer()(made.blocks, given)
-    slopes = torch.autograd.grad(judged(found), list(given.values()), create_graph=True)
-    with pytest.raises(DerivativeError, match="differentiable once"):
-        torch.autograd.grad(slopes[0].sum(), list(given.values()))
-
-
-@pytest.mark.parametrize(
-    ("option", "message"),
-    [
-        ({"backward": "explicit"}, "'implicit' or 'unroll'"),
-        ({"on_fault": "ignore"}, "'error' or 'gauss-newton'"),
-        ({"unrolled_steps": 0}, "unrolled_steps"),
-        ({"tolerance": 0.0}, "tolerance"),
-    ],
-)
-def test_options_out_of_range(option: dict[str, object], message: str) -> None:
-    with pytest.raises(SettingsError, match=message):
-        ProjectionLayer(TOP, well, **option)
-
-
-def test_both_layers_take_the_options_of_one_rule() -> None:
-    """A new one is known to type checkers as well, and reaches the rule."""
-    kinds = {field.name: get_type_hints(BackwardRule)[field.name] for field in fields(BackwardRule)}
-    assert get_type_hints(BackwardOptions) == kinds
-    options: BackwardOptions = {"unrolled_steps": 3, "accuracy": 1e-3, "products": 7, "on_fault": "gauss-newton"}
-    assert ProjectionLayer(TOP, well, **options).rule == BackwardRule(**options)
-    mesh = wavy_grid(3, 3)
-    assert JobLayer(FairRecipe(*mesh), **options).rule == BackwardRule(**options)
-    with pytest.raises(TypeError, match="newton"):
-        ProjectionLayer(TOP, well, newton=3)  # type: ignore[call-arg]

@@ -1,58 +1,28 @@
-"""A design as its users see it: drags, weights, modes, undo, windows, a lost engine; computed in truth."""
+"""A design as its users see it: drags, weights, modes, undo, refused requests; computed in truth."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from design_steps import HANDLE, OTHER, THIRD, S, drag, last, pulled
 from design_tools import Bench, failures
-from hostile_messages import texts
 
 from torchfair import Topology, load_mesh
-from torchfair.design.commands import CommandRefused, checked_command, read_command
+from torchfair.design.commands import checked_command, read_command
 from torchfair.design.containers import AT_REST, DRAGGING, JUMP
-from torchfair.design.effects import Ask, Autosave, Deliver, Tell, Wake
 from torchfair.design.engine import requests as r
-from torchfair.design.engine import saying as say
 from torchfair.design.engine.follower import Follower
-from torchfair.design.states import DesignState
 from torchfair.energies import normal_variation
 from torchfair.formfinding import condition_residuals
 from torchfair.principal import PrincipalEdges
-
-S = DesignState
-HANDLE, OTHER, THIRD = 30, 18, 42
-
-
-def pulled(bench: Bench, vertex: int = HANDLE, outwards: float = 0.1) -> list[float]:
-    """A place outside the tube."""
-    place = bench.vertices[vertex].copy()
-    place[:2] *= 1.0 + outwards
-    return [float(value) for value in place]
-
-
-def drag(bench: Bench, vertex: int = HANDLE, outwards: float = 0.1) -> list[float]:
-    """Pulls a handle in two moves and lets it go."""
-    start, end = bench.vertices[vertex].copy(), np.array(pulled(bench, vertex, outwards))
-    for share in (0.5, 1.0):
-        place = (1.0 - share) * start + share * end
-        bench.say(type="move", places=[[vertex, *map(float, place)]], count=int(2 * share))
-    bench.say(type="release", id=1)
-    assert not bench.errors
-    return end.tolist()
 
 
 def topology_of(bench: Bench) -> Topology:
     faces = bench.session.history.now.faces
     return Topology.from_packed_faces(faces.corners, faces.offsets, len(bench.vertices))
-
-
-def last(bench: Bench, kind: str) -> Any:
-    return bench.messages(kind)[-1]
 
 
 def test_what_is_opened_is_told_and_nothing_has_moved(bench: Bench, tube: Path) -> None:
@@ -326,193 +296,3 @@ def test_handles_that_are_none_are_refused(bench: Bench) -> None:
     bench.say(type="hold", vertices=[count])
     assert [f"0 to {count - 1}" in error or "sizes" in error for error in bench.errors] == [True, True, True]
     assert bench.session.state is S.READY
-
-
-# ---- windows ---------------------------------------------------------------------------------------------------------
-
-
-def test_a_second_window_is_told_everything_and_the_first_that_it_is_there(bench: Bench) -> None:
-    drag(bench)
-    bench.session.command(1, read_command('{"type": "watch", "views": ["planarity"]}'))
-    effects = bench.session.window_opened(2)
-    to_second = [e for e in effects if isinstance(e, Tell) and e.window == 2]
-    kinds = [e.message["type"] if isinstance(e.message, dict) else "container" for e in to_second]
-    assert kinds == ["state", "settings", "container", "handles", "numbers"]
-    assert [e.message["windows"] for e in effects if isinstance(e, Tell) and e.window == 1] == [2]  # type: ignore[call-overload]
-
-
-def test_only_one_window_drags_and_what_it_leaves_behind_is_let_go(bench: Bench) -> None:
-    bench.session.window_opened(2)
-    place = [HANDLE, *pulled(bench)]
-    bench.say(type="move", places=[place])
-    bench.say(2, type="move", places=[place])
-    bench.say(2, type="release")
-    assert bench.errors == ["another window drags"] * 2
-    (wake,) = [e for e in bench.session.window_closed(1) if isinstance(e, Wake)]
-    assert wake.seconds == 2.0
-    bench.carry_out(bench.session.awoken(wake.why))
-    bench.run()
-    assert bench.session.state is S.READY
-    assert bench.session.history.position == 1
-    assert bench.session.awoken(wake.why) == []
-
-
-def test_a_move_while_the_mesh_settles_is_another_edit(bench: Bench) -> None:
-    bench.say(type="move", places=[[HANDLE, *pulled(bench)]])
-    for text in ('{"type": "release"}', '{"type": "move", "places": [[18, 1.2, 0, 0]]}'):
-        bench.carry_out(bench.session.command(1, read_command(text)))
-    bench.run()
-    assert bench.session.state is S.DRAGGING
-    bench.say(type="release")
-    history = bench.session.history
-    assert [state.words for state in history.states] == ["open", f"drag vertex {HANDLE}", "drag vertex 18"]
-    assert set(history.now.handles) == {HANDLE, OTHER}
-
-
-# ---- the engine ------------------------------------------------------------------------------------------------------
-
-
-def test_a_lost_engine_comes_back_with_the_last_settled_shape(bench: Bench) -> None:
-    drag(bench, OTHER)
-    settled = bench.session.history.now
-    bench.say(type="move", places=[[HANDLE, *pulled(bench)]])
-    bench.pipe.waiting.clear()
-    bench.carry_out(bench.session.engine_lost())
-    assert bench.session.state is S.LOST
-    assert bench.starts == 2
-    bench.worker = bench._worker()
-    bench.carry_out(bench.session.engine_said(say.Started(0)))
-    assert bench.session.state is S.RESTORING
-    bench.run()
-    assert bench.session.state is S.READY
-    assert bench.session.history.now is settled
-    assert np.array_equal(bench.frames[-1].vertices, settled.vertices)
-    assert "engine has ended" in last(bench, "notice")["sentence"]
-    drag(bench, HANDLE)
-    assert set(bench.session.history.now.handles) == {OTHER, HANDLE}
-
-
-def test_what_an_engine_says_late_is_not_heard(bench: Bench) -> None:
-    drag(bench)
-    now = bench.session.history.now
-    for event in (say.Done(1, now.start), say.Failed(2, "old"), say.Made(1, (now,)), say.Answered(1, b"")):
-        assert bench.session.engine_said(event) == []
-    assert bench.session.history.now is now
-
-
-def test_stopping_what_cannot_be_cut_short_gives_the_engine_up(bench: Bench) -> None:
-    effects = bench.session.command(1, read_command('{"type": "mesh", "kind": "quads", "count": 50, "id": 8}'))
-    assert [type(e.request) for e in effects if isinstance(e, Ask)] == [r.Remake]
-    bench.carry_out(bench.session.command(1, read_command('{"type": "stop"}')))
-    assert bench.session.state is S.LOST
-    assert bench.starts == 2
-    assert "nothing has changed" in last(bench, "error")["sentence"]
-
-
-def test_a_solve_is_stopped_with_the_best_so_far(bench: Bench) -> None:
-    drag(bench)
-    for text in ('{"type": "solve", "id": 1}', '{"type": "stop"}'):
-        bench.carry_out(bench.session.command(1, read_command(text)))
-    bench.run()
-    assert bench.session.state is S.READY
-    assert bench.session.history.now.words == "solve"
-
-
-@pytest.mark.slow
-def test_weights_that_are_turned_during_a_solve_count(bench: Bench) -> None:
-    drag(bench, outwards=0.3)
-    fresh = bench.session.history.now
-    bench.say(type="solve")
-    without = bench.vertices
-    bench.say(type="undo")
-    assert bench.session.history.now is fresh
-    for text in ('{"type": "solve"}', '{"type": "weigh", "weights": {"fairness": 20.0}}'):
-        bench.carry_out(bench.session.command(1, read_command(text)))
-    bench.run()
-    assert bench.session.history.now.weights == {"fair": {"fairness": 20.0}}
-    assert np.abs(bench.vertices - without).max() > 1e-4
-
-
-# ---- files -----------------------------------------------------------------------------------------------------------
-
-
-def test_meshes_are_saved_as_they_are(bench: Bench, tmp_path: Path) -> None:
-    drag(bench)
-    bench.say(type="save", format="obj", to="download", name="shape", id=7)
-    delivered = next(e for e in bench.stored if isinstance(e, Deliver))
-    assert delivered.name == "shape.obj"
-    path = tmp_path / "again.obj"
-    path.write_bytes(delivered.content())
-    assert np.array_equal(load_mesh(path).vertices.numpy(), bench.vertices)
-
-
-def test_a_session_file_brings_everything_back(bench: Bench, tmp_path: Path) -> None:
-    bench.say(type="hold", vertices=[3])
-    drag(bench)
-    bench.say(type="subdivide")
-    bench.say(type="hold", vertices=[5])
-    bench.say(type="undo")
-    camera = {
-        "position": [0.0, 0.0, 5.0], "target": [0.0, 0.0, 0.0], "up": [0.0, 1.0, 0.0], "fov": 40.0,
-        "orthographic": False,
-    }  # fmt: skip
-    bench.say(type="camera", camera=camera)
-    assert not last(bench, "state")["saved"]
-    bench.say(type="save", format="session", to="download", id=7)
-    assert last(bench, "state")["saved"]
-    data = next(e for e in bench.stored if isinstance(e, Deliver)).content()
-    again = Bench(tmp_path)
-    again.say(type="upload", name="tube.torchfair", bytes=data)
-    assert again.errors == []
-    old, new = bench.session.history, again.session.history
-    assert (len(new.states), new.position) == (len(old.states), old.position)
-    for one, other in zip(old.states, new.states, strict=True):
-        assert np.array_equal(one.vertices, other.vertices)
-        assert (one.handles, one.held, one.weights, one.words) == (
-            other.handles,
-            other.held,
-            other.weights,
-            other.words,
-        )
-    assert json.dumps(last(again, "camera")["camera"]) == json.dumps(camera)
-    assert last(again, "state")["saved"]
-    again.say(type="redo")
-    assert np.array_equal(again.frames[-1].vertices, old.states[-1].vertices)
-    assert again.session.history.now.held[:2] == (3, 5)
-
-
-def test_every_edit_is_kept_safe_until_it_is_saved(bench: Bench) -> None:
-    assert not [e for e in bench.stored if isinstance(e, Autosave)]
-    drag(bench)
-    assert bench.stored[-1].content is not None  # type: ignore[union-attr]
-    bench.say(type="save", format="session", to="download")
-    assert bench.stored[-1] == Autosave(None)
-
-
-def state_of(bench: Bench) -> Any:
-    core = bench.session._core
-    dragged = None if core.drag is None else core.drag.document
-    return (core.state, core.pending, dragged, core.serial, core.paused, core.history.states, core.history.position)
-
-
-# ---- hostile pages ---------------------------------------------------------------------------------------------------
-
-
-def test_ten_thousand_hostile_messages_change_nothing_unless_they_are_allowed(bench: Bench) -> None:
-    """Those that would change something are real commands; all others leave the design as it was."""
-    drag(bench)
-    refused = 0
-    for text in texts(10_000, seed=1):
-        try:
-            command = read_command(text)
-        except CommandRefused:
-            refused += 1
-            continue
-        if command.type in ("hello", "ack"):
-            continue
-        was = state_of(bench)
-        effects = bench.session.command(1, command)
-        if any(isinstance(e, Tell) and isinstance(e.message, dict) and e.message["type"] == "error" for e in effects):
-            assert state_of(bench) == was
-            refused += 1
-    assert refused > 3_000

@@ -6,32 +6,17 @@ import math
 
 import pytest
 import torch
+from form_boundaries import TURN, cone_distance, ring, wave
 from helpers import wavy_grid
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.constraints import BoundaryNormals
 from torchfair.curves import ClosedCurve
 from torchfair.errors import MeshError, ShapeError
 from torchfair.formfinding import FormSettings, JobResult, Level, minimise_absolute_curvature, start_surface
 from torchfair.geometry import face_areas
 from torchfair.projection import ProjectionSettings, Status
-from torchfair.shapes import Cone, Cylinder, Surface, Torus, irregular_triangles, principal_triangles
-
-TURN = 2.0 * math.pi
-
-
-def ring(radius: float, height: float) -> ClosedCurve:
-    def function(t: Tensor) -> Tensor:
-        return torch.stack([radius * torch.cos(TURN * t), radius * torch.sin(TURN * t), height + 0 * t], 1)
-
-    return ClosedCurve.from_function(function)
-
-
-def wave() -> ClosedCurve:
-    return ClosedCurve.from_function(
-        lambda t: torch.stack([torch.cos(TURN * t), torch.sin(TURN * t), 0.5 * torch.cos(2 * TURN * t)], 1)
-    )
+from torchfair.shapes import Cone, Cylinder, Surface, irregular_triangles, principal_triangles
 
 
 def barrel(surface: Surface, bottom: float, top: float, height: float, kind: str) -> tuple[Tensor, Topology]:
@@ -41,13 +26,6 @@ def barrel(surface: Surface, bottom: float, top: float, height: float, kind: str
     t = (z - z.min()) / height
     bulge = 1.0 + 0.25 * 4.0 * t * (1.0 - t)
     return torch.stack([x * bulge, y * bulge, z], 1), mesh.topology
-
-
-def cone_distance(vertices: Tensor, bottom: float, top: float, height: float) -> float:
-    z = vertices[:, 2] - vertices[:, 2].min()
-    exact = bottom + (top - bottom) * z / height
-    slant = math.hypot(height, bottom - top) / height
-    return float((vertices[:, :2].norm(dim=1) - exact).abs().max() / slant)
 
 
 def assert_monotone(result: JobResult[Level]) -> None:
@@ -107,85 +85,6 @@ def test_a_planar_boundary_gives_the_plane() -> None:
     assert float(result.vertices[:, 2].abs().max()) < 2e-3
     assert result.after["total_absolute_curvature"] < 0.05
     assert bool((face_areas(result.vertices, topology) > 0).all())
-
-
-def test_tangent_planes_of_a_cylinder_give_it_back() -> None:
-    mesh = principal_triangles(Cylinder(radius=1.0, height=1.5), 12, 30)
-    vertices, topology = mesh.vertices.clone(), mesh.topology
-    z = vertices[:, 2]
-    t = (z - z.min()) / (z.max() - z.min())
-    bulged = vertices * torch.stack([1.0 + 0.3 * t * (1 - t), 1.0 + 0.3 * t * (1 - t), torch.ones_like(t)], 1)
-    normals = torch.where(topology.is_boundary_vertex[:, None], mesh.normals, 0.0)
-    result = minimise_absolute_curvature(bulged, topology, normals=normals)
-    assert result.before["largest_tilt_degrees"] > 5.0
-    assert result.after["largest_tilt_degrees"] < 0.5
-    assert float((result.vertices[:, :2].norm(dim=1) - 1.0).abs().max()) < 0.01
-
-
-def test_prescribed_tangent_planes_are_met() -> None:
-    """A disk whose rim is to rise at 30 degrees: a cone with a flattened tip, or a dome."""
-    vertices, topology = start_surface([ring(1.0, 0.0)], 300)
-    rim = topology.is_boundary_vertex
-    outward = vertices / vertices.norm(dim=1, keepdim=True).clamp_min(1e-9)
-    up = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64)
-    normals = torch.where(rim[:, None], math.sin(math.pi / 6) * outward + math.cos(math.pi / 6) * up, 0.0)
-    vertices[:, 2] += 0.1 * (1.0 - vertices[:, :2].square().sum(1))
-    result = minimise_absolute_curvature(vertices, topology, normals=normals, levels=1)
-    assert result.after["largest_tilt_degrees"] < 0.5
-    assert float(result.vertices[:, 2].max()) > 0.12  # the start: 0.1
-
-
-def test_normals_at_the_boundary_are_those_of_the_surface() -> None:
-    """Star normals are off by the bending over half a row; those of patches by far less, and in second order."""
-    errors = []
-    for rows in (8, 16):
-        mesh = principal_triangles(Torus(tube_angles=(0.3, 1.5)), rows, 8 * rows)
-        rim = mesh.topology.is_boundary_vertex
-        seen = BoundaryNormals.of(mesh.vertices, mesh.topology)
-        gaps = [(n - mesh.normals)[rim].norm(dim=1).max() for n in (seen.star, seen.at_boundary)]
-        errors.append([float(gap) for gap in gaps])
-        assert not bool(seen.at_boundary[~rim].any())
-    assert all(patch < 0.1 * star for star, patch in errors)
-    (star, patch), (finer_star, finer_patch) = errors
-    assert star > 1.8 * finer_star
-    assert patch > 3.5 * finer_patch
-
-
-def height_field(kind: str, rows: int = 16, columns: int = 15) -> tuple[Tensor, Tensor, Topology]:
-    """Patch over a square, its unit normals, and staggered triangles whose sides are lopsided."""
-    s, t = torch.meshgrid(
-        torch.linspace(-1, 1, rows + 1).double(), torch.linspace(-1, 1, columns + 1).double(), indexing="ij"
-    )
-    shift = (torch.arange(rows + 1) % 2)[:, None] * (1.0 - t.square()) / columns
-    x, y = (t + shift).flatten(), s.flatten()
-    faces = []
-    for row in range(rows):
-        for column in range(columns):
-            a, b = row * (columns + 1) + column, row * (columns + 1) + column + 1
-            c, d = a + columns + 1, b + columns + 1
-            faces += [[a, b, c], [b, d, c]] if row % 2 == 0 else [[a, b, d], [a, d, c]]
-    root = {"cap": 4.0 - x * x - y * y, "cylinder": 2.2 - x * x}
-    if kind == "saddle":
-        z, dx, dy = 0.5 * x * y, 0.5 * y, 0.5 * x
-    else:
-        z = root[kind].sqrt()
-        dx, dy = -x / z, -y / z if kind == "cap" else torch.zeros_like(y)
-    normals = torch.stack([-dx, -dy, torch.ones_like(x)], 1)
-    return torch.stack([x, y, z], 1), normals / normals.norm(dim=1, keepdim=True), Topology.from_faces(faces)
-
-
-@pytest.mark.parametrize("kind", ["cap", "saddle", "cylinder"])
-def test_tangent_planes_along_patches_with_corners_are_met(kind: str) -> None:
-    exact, normals, topology = height_field(kind)
-    bump = 0.15 * (1.0 - exact[:, :1].square()) * (1.0 - exact[:, 1:2].square())
-    along = torch.where(topology.is_boundary_vertex[:, None], normals, 0.0)
-    result = minimise_absolute_curvature(exact + bump * normals, topology, normals=along)
-    assert result.before["largest_tilt_degrees"] > 5.0
-    assert result.after["largest_tilt_degrees"] < 0.1
-    assert result.after["smallest_angle_degrees"] > 15.0
-    if kind == "cylinder":  # it is given back
-        away = (result.vertices[:, [0, 2]].norm(dim=1) - math.sqrt(2.2)).abs()
-        assert float(away.max()) < 0.01
 
 
 @pytest.mark.parametrize("unit", [1e-3, pytest.param(1000.0, marks=pytest.mark.slow)])
@@ -324,30 +223,3 @@ def test_bad_requests_are_refused() -> None:
         FormSettings(boundary="loose")
     with pytest.raises(ValueError, match="smoothing"):
         FormSettings(smoothing=3.0)
-
-
-@pytest.mark.parametrize("count", [7, 57, 1000])
-def test_start_disks_have_valence_six_and_good_faces(count: int) -> None:
-    vertices, topology = start_surface([wave()], count)
-    assert topology.num_vertices == pytest.approx(count, rel=0.1)
-    assert topology.num_vertices - topology.num_edges + topology.num_faces == 1
-    assert set(topology.valences[~topology.is_boundary_vertex].tolist()) <= {6}
-    assert bool((face_areas(vertices, topology) > 0).all())
-
-
-def test_start_annuli_join_curves_of_either_direction() -> None:
-    back = ClosedCurve.from_function(
-        lambda t: torch.stack([0.5 * torch.cos(1.0 - TURN * t), 0.5 * torch.sin(1.0 - TURN * t), 1.0 + 0 * t], 1)
-    )
-    vertices, topology = start_surface([ring(1.0, 0.0), back], 500)
-    assert topology.num_vertices - topology.num_edges + topology.num_faces == 0
-    assert len(topology.boundary_loops()) == 2
-    # Straight lines between nearest places: the cone itself.
-    assert cone_distance(vertices, 1.0, 0.5, 1.0) < 0.02
-
-
-def test_start_surfaces_refuse_what_they_cannot_join() -> None:
-    with pytest.raises(MeshError, match="got none"):
-        start_surface([])
-    with pytest.raises(MeshError, match="at least 7"):
-        start_surface([wave()], 3)

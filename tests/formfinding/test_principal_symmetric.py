@@ -7,42 +7,16 @@ import math
 import pytest
 import torch
 from helpers import DOUBLE, random_rotation, tetrahedron
+from symmetric_starts import STARTS, largest, pulled, start
 
 from torchfair import MeshError, ShapeError, Topology
 from torchfair.constraints.principal_symmetric import star_stencil, unevenness
-from torchfair.energies import normal_variation
-from torchfair.formfinding import SymmetricDesign, SymmetricSettings, principal_symmetric, strip_normals
-from torchfair.formfinding.symmetric.measures import condition_residuals
+from torchfair.formfinding import SymmetricDesign, SymmetricSettings, principal_symmetric
 from torchfair.geometry import vertex_normals
-from torchfair.principal import PrincipalEdges, developable_strips, principal_edges_of_lattice, star_spheres
+from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
 from torchfair.projection.result import IterationRecord
-from torchfair.shapes import Catenoid, Cylinder, Enneper, Paraboloid, Torus, principal_triangles
+from torchfair.shapes import Cylinder, Paraboloid, Torus, principal_triangles
 from torchfair.shapes.principal_triangles import parameter_triangles
-
-STARTS = {
-    "torus": lambda: principal_triangles(Torus(2.0, 1.0), 10, 14),
-    "catenoid": lambda: principal_triangles(Catenoid(), 8, 16, along="v", ends="zigzag"),
-    "enneper": lambda: principal_triangles(Enneper(0.8), 10, 10, ends="zigzag"),
-}
-
-
-def start(name: str) -> tuple[torch.Tensor, PrincipalEdges]:
-    mesh = STARTS[name]()
-    return mesh.vertices, principal_edges_of_lattice(mesh, "v" if name == "catenoid" else "u").check()
-
-
-def pulled(vertices: torch.Tensor, edges: PrincipalEdges, share: float) -> dict[int, list[float]]:
-    """One star pulled along its normal by a share of the size, the vertex farthest from it kept."""
-    stars = edges.stars().vertices
-    vertex = int(stars[len(stars) // 3])
-    size = float((vertices.amax(0) - vertices.amin(0)).max())
-    far = int((vertices - vertices[vertex]).norm(dim=1).argmax())
-    place = vertices[vertex] + share * size * vertex_normals(vertices, edges.topology)[vertex]
-    return {vertex: place.tolist(), far: vertices[far].tolist()}
-
-
-def largest(vertices: torch.Tensor, edges: PrincipalEdges) -> float:
-    return max(float(part.max()) for part in condition_residuals(vertices, edges, edges.stars()).values())
 
 
 @pytest.mark.parametrize("name", STARTS)
@@ -65,17 +39,6 @@ def test_pulled_by_a_fifth_of_the_size_and_refined_the_conditions_hold(name: str
     assert result.notes == []
     assert result.holds
     assert len(result.promises) == 5
-
-
-@pytest.mark.parametrize("name", STARTS)
-def test_strips_along_all_principal_polylines_are_planar_up_to_the_boundary(name: str) -> None:
-    vertices, edges = start(name)
-    level = principal_symmetric(vertices, edges, handles=pulled(vertices, edges, 0.05)).levels[0]
-    torch.testing.assert_close(level.normals.norm(dim=1), torch.ones(len(vertices), dtype=DOUBLE))
-    assert float((level.normals * vertex_normals(level.vertices, edges.topology)).sum(1).min()) > 0.9
-    strips = developable_strips(level.vertices, edges.polylines(), level.normals, 0.05)
-    assert float(strips.planarity.max()) < 1e-8
-    assert float(strips.isometry_errors.max()) < 1e-10
 
 
 def test_exact_starts_stay_where_they_are() -> None:
@@ -128,14 +91,6 @@ def test_unit_and_place_do_not_matter() -> None:
     assert float((other.vertices - expected).norm(dim=1).max()) < 1e-3 * edge
 
 
-@pytest.mark.parametrize("formulation", ["eliminated", "lifted"])
-def test_other_formulations_meet_the_conditions_too(formulation: str) -> None:
-    vertices, edges = start("torus")
-    settings = SymmetricSettings(formulation=formulation)
-    result = principal_symmetric(vertices, edges, handles=pulled(vertices, edges, 0.05), settings=settings)
-    assert largest(result.vertices, edges) < 1e-6
-
-
 def test_flat_and_cylindrical_meshes_stay_finite_and_exact() -> None:
     flat = parameter_triangles(Paraboloid(0.0, 0.0), 9, 9, ends="zigzag")
     bent = principal_triangles(Cylinder(), 8, 16, ends="zigzag")
@@ -159,45 +114,6 @@ def test_fixed_vertices_and_boundaries_keep_their_places_through_levels() -> Non
     fixed[edges.stars().vertices[5]] = True
     kept = principal_symmetric(vertices, edges, handles={vertex: handles[vertex]}, fixed=fixed)
     assert torch.equal(kept.vertices[fixed], vertices[fixed])
-
-
-def test_conditions_on_one_polyline_leave_the_rest_to_energy() -> None:
-    mesh = STARTS["torus"]()
-    edges = principal_edges_of_lattice(mesh)
-    generator = torch.Generator().manual_seed(4)
-    vertices = mesh.vertices + 0.03 * torch.randn(mesh.vertices.shape, generator=generator, dtype=DOUBLE)
-    line = edges.polylines()[3]
-    settings = SymmetricSettings(energy_weight=0.3)
-    result = principal_symmetric(vertices, edges, on=line, settings=settings, levels=1)
-    stars = edges.stars()
-    chosen = torch.isin(stars.vertices, line)
-    coarse = result.levels[0]
-    residuals = condition_residuals(coarse.vertices, edges, stars)["cospherical"]
-    assert float(residuals[chosen].max()) < 1e-8
-    assert float(residuals[~chosen].max()) > 1e-4
-    assert coarse.after["stars"] == len(torch.unique(line))
-    assert coarse.after["normal_variation"] < coarse.before["normal_variation"]
-    assert result.levels[1].after["stars"] == 2 * len(torch.unique(line))
-
-
-@pytest.mark.slow
-def test_energy_has_the_variables_of_the_paper_too() -> None:
-    """3V + 3R + 3n + 2R of spheres, planes and slacks, and 3F + 4I of E, in the runs that lower it; E falls by it."""
-    vertices, edges = start("torus")
-    handles = pulled(vertices, edges, 0.05)
-    energies = {}
-    for weight in (0.0, 1.0):
-        settings = SymmetricSettings(formulation="lifted", energy_weight=weight)
-        result = principal_symmetric(vertices, edges, handles=handles, settings=settings)
-        level, topology = result.levels[-1], edges.topology
-        stars, planes = len(edges.stars().vertices), int(edges.mask.sum())
-        count = 3 * topology.num_vertices + 3 * stars + 3 * planes + 2 * stars
-        with_energy = count + 3 * topology.num_faces + 4 * topology.num_interior_edges
-        sizes = [sum(block.numel() for block in run.blocks.values()) for run in level.runs]
-        assert max(sizes) == (with_energy if weight else count)
-        assert max(level.after["largest_cospherical"], level.after["largest_coplanar"]) < 1e-6
-        energies[weight] = float(normal_variation(level.vertices, topology))
-    assert energies[1.0] < energies[0.0]
 
 
 def test_handles_that_ask_for_the_impossible_yield_to_the_conditions() -> None:
@@ -271,25 +187,6 @@ def test_an_edit_from_a_warm_state_is_the_same_design() -> None:
             design.move({vertex: place})
 
 
-def test_one_round_meets_conditions_and_saddle_sides_together() -> None:
-    """Steps heed saddle sides while conditions are met; blind ones leave some stars beside the boundary wrong."""
-    mesh = principal_triangles(Catenoid(1.0, (-1.0, 1.0)), 16, 30, along="v", ends="zigzag")
-    edges = principal_edges_of_lattice(mesh, "v")
-    vertices, stars = mesh.vertices, edges.stars().vertices
-    handle = int(stars[len(stars) // 2])
-    far = int((vertices - vertices[handle]).norm(dim=1).argmax())
-    pull = 0.25 * float((vertices.amax(0) - vertices.amin(0)).norm())
-    place = vertices[handle] + pull * vertex_normals(vertices, edges.topology)[handle]
-    design = SymmetricDesign(vertices, edges, handles=[handle, far])
-    handles = {handle: place.tolist(), far: vertices[far].tolist()}
-    design.move(handles, rounds=1)
-    measures = design.measures()
-    assert max(measures["largest_cospherical"], measures["largest_coplanar"]) < 1e-9
-    assert measures["saddle_side_share"] == 1.0
-    assert measures["crossing_pyramids_negative"] == 0.0
-    assert measures["largest_handle_distance"] < 0.05 * measures["mean_edge_length"]
-
-
 def test_singular_vertices_are_left_out() -> None:
     from principal_lattices import cone
 
@@ -333,23 +230,3 @@ def test_refusals() -> None:
     for wrong in ({"boundary": "glide"}, {"formulation": "other"}, {"fairness_weight": -1.0}, {"most_steps": 0}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             SymmetricSettings(**wrong)  # type: ignore[arg-type]
-
-
-def test_normals_at_stars_are_those_of_their_spheres() -> None:
-    """Whatever principal edges along the boundary ask of the normals at their ends."""
-    vertices, edges = start("enneper")
-    noise = torch.randn(vertices.shape, dtype=DOUBLE, generator=torch.Generator().manual_seed(0))
-    moved = vertices + 0.01 * noise
-    stars = edges.stars()
-    normals = strip_normals(moved, edges)
-    torch.testing.assert_close(normals[stars.vertices], star_spheres(moved, stars).normals, rtol=0, atol=1e-12)
-    torch.testing.assert_close(normals.norm(dim=1), torch.ones(len(normals), dtype=DOUBLE))
-
-
-def test_normals_of_float32_meshes_keep_their_dtype() -> None:
-    vertices, edges = start("enneper")
-    normals = strip_normals(vertices.float(), edges)
-    assert normals.dtype == torch.float32
-    assert float((normals.norm(dim=1) - 1.0).abs().max()) < 1e-6
-    result = principal_symmetric(vertices.float(), edges)
-    assert result.vertices.dtype == torch.float32

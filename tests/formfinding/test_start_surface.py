@@ -6,6 +6,7 @@ import math
 
 import pytest
 import torch
+from form_boundaries import TURN, cone_distance, ring, wave
 from torch import Tensor
 
 from torchfair import Topology
@@ -165,3 +166,30 @@ def test_a_start_that_has_to_run_through_itself_says_so() -> None:
     disk = FormRecipe(*start_surface([circle(1.0, 0.0)], 61))
     disk.before()
     assert not disk.notes
+
+
+@pytest.mark.parametrize("count", [7, 57, 1000])
+def test_start_disks_have_valence_six_and_good_faces(count: int) -> None:
+    vertices, topology = start_surface([wave()], count)
+    assert topology.num_vertices == pytest.approx(count, rel=0.1)
+    assert topology.num_vertices - topology.num_edges + topology.num_faces == 1
+    assert set(topology.valences[~topology.is_boundary_vertex].tolist()) <= {6}
+    assert bool((face_areas(vertices, topology) > 0).all())
+
+
+def test_start_annuli_join_curves_of_either_direction() -> None:
+    back = ClosedCurve.from_function(
+        lambda t: torch.stack([0.5 * torch.cos(1.0 - TURN * t), 0.5 * torch.sin(1.0 - TURN * t), 1.0 + 0 * t], 1)
+    )
+    vertices, topology = start_surface([ring(1.0, 0.0), back], 500)
+    assert topology.num_vertices - topology.num_edges + topology.num_faces == 0
+    assert len(topology.boundary_loops()) == 2
+    # Straight lines between nearest places: the cone itself.
+    assert cone_distance(vertices, 1.0, 0.5, 1.0) < 0.02
+
+
+def test_start_surfaces_refuse_what_they_cannot_join() -> None:
+    with pytest.raises(MeshError, match="got none"):
+        start_surface([])
+    with pytest.raises(MeshError, match="at least 7"):
+        start_surface([wave()], 3)
