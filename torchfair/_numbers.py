@@ -14,7 +14,14 @@ def is_number(value: object) -> bool:
 
 
 def check_number(
-    name: str, value: object, *, least: float = 0.0, above: bool = False, most: float = math.inf, finite: bool = False
+    name: str,
+    value: object,
+    *,
+    least: float = 0.0,
+    above: bool = False,
+    most: float = math.inf,
+    finite: bool = False,
+    or_none: bool = False,
 ) -> None:
     """Raises SettingsError naming the setting unless it is a number between ``least`` and ``most``.
 
@@ -25,12 +32,16 @@ def check_number(
         above: See ``least``.
         most: The largest number allowed.
         finite: Whether infinity is refused.
+        or_none: Whether None is allowed.
     """
+    if or_none and value is None:
+        return
     if is_number(value):
         number = float(value)  # type: ignore[arg-type]
         if (number > least if above else number >= least) and number <= most and not (finite and math.isinf(number)):
             return
     bounds = f"{'above' if above else 'of at least'} {least:g}" + (f" and at most {most:g}" if most < math.inf else "")
+    bounds += ", or none" if or_none else ""
     raise SettingsError(f"{name} must be a {'finite ' if finite else ''}number {bounds}, got {value!r}")
 
 

@@ -45,6 +45,12 @@ def test_numbers_before_the_first_and_behind_the_last_are_refused(first: int) ->
             chosen.numbered("--fix", str(number))
 
 
+@pytest.mark.parametrize("words", ["1 0 0 nan", "1 inf 0 0", "near 0 nan 0 to 0 0 1", "near 0 0 0 to 0 0 -inf"])
+def test_handles_that_are_not_finite_are_refused_as_they_were_written(words: str) -> None:
+    with pytest.raises(CommandError, match=f"^--handle: coordinates must be finite numbers, got '{words}'$"):
+        ChosenVertices(grid()).handle("--handle", words)
+
+
 def test_a_place_is_refused_where_it_is_far_or_could_be_two_vertices() -> None:
     chosen = ChosenVertices(grid())
     vertices = chosen.mesh.vertices

@@ -41,7 +41,10 @@ def one_line(text: str) -> str:
         (["measure", "x.obj", "--worst", "many"], "torchfair measure: error: ", "'many'"),
         (["measure", "x.obj", "--worst", "-1"], "torchfair measure: error: ", "'-1'"),
         (["measure", "missing.obj"], "torchfair measure: error: ", "missing.obj"),
-        (["measure", "."], "torchfair measure: error: ", "."),
+        (["measure", "x.obj", "--worts=3"], "torchfair measure: error: ", "--worts=3, did you mean --worst? ("),
+        (["--verson"], "torchfair: error: ", "did you mean --version?"),
+        (["measure", "x.obj", "--steps", "3"], "torchfair measure: error: ", "--steps 3 (torchfair measure --help"),
+        (["measure", "."], "torchfair measure: error: ", ".: is a folder: name the mesh files in it"),
         (["measure", "x\ny.obj"], "torchfair measure: error: ", "x y.obj"),
     ],
 )

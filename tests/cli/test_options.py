@@ -119,7 +119,8 @@ def test_faults_of_options_and_files_are_command_errors(tmp_path: Path) -> None:
     for words, message in (
         (["--boundary", "loose"], "--boundary: expected one of glide, fixed, free, got 'loose'"),
         (["--corner-angle", "200"], "--corner-angle: expected degrees from 0 to 180"),
-        (["--distance", "-1"], "^--distance .* above 0, got -1.0"),
+        (["--distance", "-1"], "^--distance must be a number above 0, or none, got -1.0"),
+        (["--time-limit", "-1"], "^--time-limit must be a number of at least 0, or none, got -1.0"),
         (["--fairness", "-1"], ": --fairness=-1.0"),
         (["--continuation", "3,1"], "^--continuation must hold finite factors above 1"),
         (["--iterations", "-1"], "^--iterations must be a whole number"),

@@ -107,8 +107,14 @@ def test_what_a_job_refuses_is_named_as_the_file_counts(tmp_path: Path, capsys: 
     path = tmp_path / "flat.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 1 1 0\n\nf 1 3 4\nf 3 1 2\n")
     assert main(["fair", str(path), "-o", str(tmp_path / "o.obj")]) == 2
-    assert "1 face(s) have no area: faces 2 (line 7). " in capsys.readouterr().err
+    assert f"error: {path}: 1 face(s) have no area: faces 2 (line 7). " in capsys.readouterr().err
+    assert main(["mesh", str(path), "--quads", "9", "-o", str(tmp_path / "o.obj")]) == 2
+    assert f"error: {path}: 1 face(s) have no area: faces 2 (line 7). " in capsys.readouterr().err
     assert main(["subdivide", str(path), "--repair", "-o", str(tmp_path / "o.obj")]) == 0
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\n\nf 1 2 3\n")  # too small for principal directions
+    assert main(["symmetric", str(path), "-o", str(tmp_path / "s.obj")]) == 2
+    said = "directions: none in the component of face 1 (line 5) (vertex 1). Choose the family by one of its edges, "
+    assert f"error: {path}: {said}with --seed V W" in capsys.readouterr().err
 
 
 def test_groups_and_the_like_come_back_or_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

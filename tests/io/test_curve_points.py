@@ -50,6 +50,8 @@ def test_comments_headings_normals_and_a_repeated_end(tmp_path: Path) -> None:
         (b"0 0 0\n1 0\n", "line 2: expected three or six"),
         (b"1 2 3 4\n", "line 1"),
         (b"0 0 0\n1 x 0\n", "line 2"),
+        (b"x y z\n\n0 0 0\n1 0 nan\n0 1 0\n", "line 4: expected finite numbers, got 1.0, 0.0, nan"),
+        (b"0 0 0\n1 0 0\n0 1e400 0\n", "line 3: expected finite numbers"),
         (b"\x00\x01\x02", "binary"),
     ],
 )

@@ -82,6 +82,8 @@ class ChosenVertices:
         places = parts[1:] if near else parts
         if len(places) != (6 if near else 4) or not all(map(_is_number, places)):
             raise CommandError(expected)
+        if not all(math.isfinite(float(word)) for word in places):
+            raise CommandError(f"{option}: coordinates must be finite numbers, got '{words}'")
         target = [float(word) for word in places[-3:]]
         if near:
             return self.near(option, [float(word) for word in places[:3]]), target

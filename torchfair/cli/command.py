@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import io
 import os
 import sys
@@ -84,7 +85,11 @@ def _parse(argv: Sequence[str] | None, parsed: list[argparse.Namespace]) -> int:
         arguments.input, unknown = arguments.input + unknown, []  # inputs may stand on both sides of options
     if unknown:  # argparse would name the parser of all commands here
         name = getattr(arguments, "name", "torchfair")
-        raise CommandError(f"unrecognized arguments: {' '.join(unknown)} ({name} --help lists the options)", name)
+        wrong = next((word.partition("=")[0] for word in unknown if word.startswith("--")), "")
+        near = difflib.get_close_matches(wrong, arguments.options, 1, 0.75)
+        hint = f", did you mean {near[0]}?" if near else ""
+        raise CommandError(f"unrecognized arguments: {' '.join(unknown)}{hint} ({name} --help lists the options)", name)
+    del arguments.options
     if arguments.version:
         from .. import __version__
 

@@ -116,7 +116,7 @@ class JobCommand(ABC):
             return self._report(arguments, request, result, settings)
 
         with deferred_interrupts() as interrupts:  # from the first step to the file nothing is lost
-            with in_numbers_of(mesh):
+            with in_numbers_of(mesh, getattr(arguments, "input", None)):
                 result = solve()
             outputs.save(request, result, report)
             request.interrupted = interrupts.pending

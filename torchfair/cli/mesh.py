@@ -113,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
     surface = read_input(arguments.input, arguments)
     outputs.make_folders(surface, 0)
     began = time.perf_counter()
-    with in_numbers_of(surface):
+    with in_numbers_of(surface, arguments.input):
         made = _made(surface, arguments, settings)
     not_planar: list[str] = []
     status, request = None, Request(surface, {}, view=view_of(arguments, surface))

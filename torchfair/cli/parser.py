@@ -33,7 +33,9 @@ class CommandParser(argparse.ArgumentParser):
         if fill is not None:
             fill(self)
         words = list(sys.argv[1:] if not args or args[0] is None else args[0])
-        return super().parse_known_args(joined_places(with_default_tolerance(words)), *args[1:], **kwargs)
+        parsed, unknown = super().parse_known_args(joined_places(with_default_tolerance(words)), *args[1:], **kwargs)
+        vars(parsed).setdefault("options", tuple(self._option_string_actions))  # those of a command come first
+        return parsed, unknown
 
     def error(self, message: str) -> NoReturn:
         """Refuses the arguments."""

@@ -81,11 +81,12 @@ def read_report(mesh: PolygonMesh) -> dict[str, Any]:
 
 
 @contextmanager
-def in_numbers_of(mesh: PolygonMesh) -> Iterator[None]:
-    """Errors name vertices and faces as the file of the mesh does."""
+def in_numbers_of(mesh: PolygonMesh, file: str | None) -> Iterator[None]:
+    """Errors name vertices and faces as the file of the mesh does, and the file, if there is one."""
     from .._names import PlacedError
 
     try:
         yield
     except PlacedError as error:
-        raise MeshError(error.sentence.told(mesh.names)) from None
+        told = error.sentence.told(mesh.names)
+        raise MeshError(told if file is None else f"{file}: {told}") from None

@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     make_folders(written, _BYTES * mesh.topology.num_vertices * 4**arguments.levels)
     scheme: Any = arguments.scheme.replace("-", "_")
     corners = boundary_corners(mesh.vertices, mesh.topology, math.radians(arguments.corner_angle))
-    with in_numbers_of(mesh):
+    with in_numbers_of(mesh, arguments.input):
         step = refine(mesh.topology, scheme, arguments.levels, boundary=arguments.boundary, corners=corners)
     fine, notes = None, said_of(mesh)
     if marks is not None:

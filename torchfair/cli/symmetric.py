@@ -104,7 +104,7 @@ class SymmetricCommand(JobCommand):
         handles, fixed = read_handles(arguments, chosen), read_fixed(arguments, chosen)
         on = [vertex for words in arguments.on for vertex in chosen.of("--on", words)]
         if mesh.topology.is_quadrangular:
-            with in_numbers_of(mesh):
+            with in_numbers_of(mesh, arguments.input):
                 edges, vertices, notes = read_quads(arguments, chosen)
             settings = even_settings(self.options().asked(arguments), settings)
             notes += not_held(Path(arguments.output), mesh, same=False, marks=True)

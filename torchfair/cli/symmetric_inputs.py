@@ -28,6 +28,7 @@ _MOST_SLIDE = 1.4
 _OPTIONS = {
     "allow_exceptions=True": "--allow-exceptions",
     "seed_edge:": "--seed:",
+    "Give a direction at one or more of its vertices": "Choose the family by one of its edges, with --seed V W",
     "go without conditions there": "go without conditions there with --allow-exceptions",
 }
 """What errors of the library call options, in words of the command line."""
@@ -50,7 +51,7 @@ def read_principal_edges(arguments: argparse.Namespace, chosen: ChosenVertices) 
     from ..principal import misalignment_of
 
     try:
-        with in_numbers_of(chosen.mesh):
+        with in_numbers_of(chosen.mesh, arguments.input):
             edges, origin = _chosen_edges(arguments, chosen)
     except MeshError as error:
         words = str(error)

@@ -29,7 +29,7 @@ def read_table(path: Path, data: bytes, widths: Sequence[int]) -> Floats:
     numbers apart otherwise (0.5,0.0,1.5 and 0.5, 0.0, 1.5). What could be either (0.5;0,5;1, 1.234,5;0;0) is refused.
 
     Raises:
-        MeshFileError: naming file and line, if a line is no such row.
+        MeshFileError: naming file and line, if a line is no such row, or one of its numbers is not finite.
     """
     lines = [line.split(b"#", 1)[0].replace(b";", b" ") for line in check_text(path, data).splitlines()]
     head = next((number for number, line in enumerate(lines) if line.split()), 0)
@@ -54,7 +54,12 @@ def _rows(path: Path, text: Words, widths: Sequence[int]) -> Floats:
         wanted = " or ".join(map(_COUNTS.__getitem__, widths))
         fault = f"expected {wanted} numbers in every line, found {sizes[wrong[0]]}"
         raise MeshFileError(path, fault, int(text.lines[wrong[0]]))
-    return to_floats(path, text, np.arange(len(text.words))).reshape(-1, width)
+    rows = to_floats(path, text, np.arange(len(text.words))).reshape(-1, width)
+    lost = np.flatnonzero(~np.isfinite(rows).all(1))
+    if lost.size:
+        row = ", ".join(map(str, rows[lost[0]].tolist()))
+        raise MeshFileError(path, f"expected finite numbers, got {row}", int(text.lines[lost[0]]))
+    return rows
 
 
 _COUNTS = {3: "three", 6: "six"}

@@ -149,6 +149,8 @@ def _remedy(raw: RawMesh, repair: bool, weld: bool | float, split_edges: bool) -
 def _read_raw(path: Path, surfaces: Cells | None) -> RawMesh:
     suffix = path.suffix.lower()
     if suffix not in (*_READERS, *others.READ):
+        if path.is_dir():
+            raise MeshFileError(path, "is a folder: name the mesh files in it")
         known = ", ".join((*_READERS, *others.READ))
         raise MeshFileError(path, f"the extension {suffix or '(none)'} is no known mesh format. Known are {known}")
     data = read_bytes(path)

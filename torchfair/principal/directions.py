@@ -9,6 +9,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
+from .._names import PlacedError
 from ..errors import ShapeError, TorchfairError
 from ..geometry import fitted_curvature, star_normals
 from ..geometry._ops import cross, dot
@@ -226,8 +227,11 @@ def _mean(values: Floats, weights: Floats) -> float:
 def _require_directions(topology: Topology, means: Floats, roots: Ints) -> None:
     empty = np.flatnonzero(np.isinf(means).all(0))
     if empty.size:
-        face = roots[empty[0]]
-        raise TorchfairError(
-            f"directions: none in the component of face {face} (vertex {topology.corners[3 * face].item()}). "
-            "Give a direction at one or more of its vertices."
+        face = int(roots[empty[0]])
+        raise PlacedError(
+            "directions: none in the component of face ",
+            ("face", face),
+            " (vertex ",
+            ("vertex", int(topology.corners[3 * face])),
+            "). Give a direction at one or more of its vertices.",
         )

@@ -208,8 +208,7 @@ class FairSettings:
         factors = self.continuation if isinstance(self.continuation, Iterable) else (self.continuation,)
         if not all(is_number(factor) and 1.0 < factor < math.inf for factor in factors):
             raise SettingsError(f"continuation must hold finite factors above 1, got {self.continuation}")
-        if self.distance_limit is not None:
-            check_number("distance_limit (or None)", self.distance_limit, above=True)
+        check_number("distance_limit", self.distance_limit, above=True, or_none=True)
 
     def stage(self) -> ProjectionSettings:
         """Settings of a stage before the last: fewer steps, wider tolerance, no waiting for what damping holds back."""

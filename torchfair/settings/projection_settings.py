@@ -109,8 +109,7 @@ class ProjectionSettings:
         check_number("least_extrapolation", self.least_extrapolation, least=1.0)
         check_number("least_uncorrected_gain", self.least_uncorrected_gain, least=-math.inf)
         check_number("accuracy", self.accuracy, above=True, most=1.0)
-        if self.time_limit is not None:
-            check_number("time_limit", self.time_limit)
+        check_number("time_limit", self.time_limit, or_none=True)
         if not isinstance(self.solver, str) and (
             isinstance(self.solver, type) or not hasattr(self.solver, "factorise")
         ):
