@@ -22,6 +22,8 @@ from .sheet import CAPTION, GAP, MARGIN, Sheet
 from .view_direction import ViewDirection, view_direction
 from .wireframe import quiet_edges
 
+_SECOND_LINE = 34  # rows of pixels from one line of words above a mesh to the next
+
 
 def picture_curvature(
     path: str | os.PathLike[str],
@@ -68,15 +70,17 @@ def picture_curvature(
     towards_eye, up = view or view_direction(vertices[-1], topologies[-1])
     camera, size = fit_camera(*vertices, towards_eye=towards_eye, up=up, width=panel)
 
-    row = CAPTION + size[0]
+    words = CAPTION + _SECOND_LINE
+    row = words + size[0]
     sheet = Sheet(width, row + size[0] + MARGIN, title)
     for column, (name, *_) in enumerate(meshes):
         left, top = MARGIN + column * (panel + GAP), sheet.top
         mesh = MeshView(vertices[column], topologies[column], camera, size)
         total = float(stars[column].sum())
-        sheet.caption(f"{literal(name)}     $C$ (boundary extrapolated) = {four_digits(total)}", left, top, panel)
+        sheet.caption(literal(name), left, top, panel)
+        sheet.caption(f"$C$ = {four_digits(total)}, boundary extrapolated", left, top + _SECOND_LINE, panel)
         daylight, colors = _panels(mesh, scale.colors(values[column]))
-        sheet.image(daylight, left, top + CAPTION)
+        sheet.image(daylight, left, top + words)
         sheet.image(colors, left, top + row)
     scale.draw_bar(sheet, row + size[0])
     return sheet.write(path, overwrite=overwrite)
