@@ -90,6 +90,12 @@ def test_the_page_of_a_design_does_not_wait_for_torch_and_nothing_for_its_compil
         "from torchfair.shapes import EXAMPLES, SURFACES, builtin_mesh; [*map(builtin_mesh, [*EXAMPLES, *SURFACES])]"
     )
     assert "torch._dynamo" not in modules_after(shapes)
+    measured = (
+        "from torchfair.shapes import ClosestOnSurface, Torus, irregular_triangles as made; from torchfair.measuring "
+        "import measure_stationarity; mesh = made(Torus(), 60); "
+        "measure_stationarity(mesh.vertices, mesh.topology, ClosestOnSurface(mesh.surface))"
+    )
+    assert "torch._dynamo" not in modules_after(measured)
 
 
 def test_star_and_parts_need_no_import_of_their_own() -> None:

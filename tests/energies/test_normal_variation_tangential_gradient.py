@@ -104,6 +104,31 @@ def test_gradcheck_and_vmap():
     torch.testing.assert_close(mapped, normal_variation_tangential_gradient(batch, normals, topology))
 
 
+def test_whatever_follows_the_vertices_sees_the_same():
+    """Gradients of plain tensors take another way than those that something follows."""
+    vertices, topology = wavy_grid(4, 4, triangles=True)
+    normals, motion = vertex_normals(vertices, topology), vertices.sin()
+    weights = torch.linspace(0.5, 2.0, topology.num_interior_edges, dtype=DOUBLE)
+
+    def function(points: torch.Tensor) -> torch.Tensor:
+        return normal_variation_tangential_gradient(points, normals, topology, weights)
+
+    part = function(vertices)
+    for around in (torch.no_grad, torch.inference_mode):
+        with around():
+            torch.testing.assert_close(function(vertices), part)
+    assert not part.requires_grad
+    with torch.autograd.forward_ad.dual_level():
+        dual = torch.autograd.forward_ad.unpack_dual(function(torch.autograd.forward_ad.make_dual(vertices, motion)))
+    step = 1e-6
+    rate = (function(vertices + step * motion) - function(vertices - step * motion)) / (2 * step)
+    torch.testing.assert_close(dual.tangent, rate, rtol=1e-6, atol=1e-7)
+    torch.testing.assert_close(torch.func.jvp(function, (vertices,), (motion,))[1], dual.tangent)
+    weights.requires_grad_()
+    function(vertices).square().sum().backward()
+    torch.testing.assert_close((weights.grad * weights).sum(), 2 * part.square().sum())  # of degree 2 in the weights
+
+
 def test_flat_meshes_are_stationary():
     vertices, topology = wavy_grid(5, 5, triangles=True)
     flat = vertices * torch.tensor([1.0, 1.0, 0.0], dtype=DOUBLE)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor
+from torch.autograd.forward_ad import unpack_dual
 
 from .._precision import in_single_at_least
+from .._tracing import is_recorded, is_transformed
 from ..errors import ShapeError
 from ..topology import Topology
-from .normal_variation import normal_variation
+from .normal_variation import normal_variation_per_edge
 
 
 @in_single_at_least
@@ -54,10 +56,37 @@ def normal_variation_tangential_gradient(
     """
     topology.check_vertices(vertices)
     _check_normals(normals, vertices)
-    total = torch.func.grad(lambda points: normal_variation(points, topology, edge_weights).sum())
-    gradient: Tensor = total(vertices)
+    gradient = _gradient(vertices, topology, edge_weights)
     normals = normals.to(gradient.dtype)
     return gradient - (gradient * normals).sum(-1, keepdim=True) * normals
+
+
+def _gradient(vertices: Tensor, topology: Topology, edge_weights: Tensor | None) -> Tensor:
+    """The gradient of E, followed by whatever follows its arguments.
+
+    Where nothing does, by plain autograd: ``torch.func.grad`` loads the compiler of torch, which takes a second.
+    """
+
+    def energy(points: Tensor) -> Tensor:
+        return normal_variation_per_edge(points, topology, edge_weights).sum()
+
+    if not _is_followed(vertices, edge_weights):
+        with torch.enable_grad():
+            points = vertices.detach().requires_grad_()
+            return torch.autograd.grad(energy(points), points)[0]
+    gradient: Tensor = torch.func.grad(energy)(vertices)
+    return gradient
+
+
+def _is_followed(vertices: Tensor, edge_weights: Tensor | None) -> bool:
+    """Whether autograd, dual numbers, a transform or a recording wants to know where the gradient comes from."""
+    inputs = [vertices] if edge_weights is None else [vertices, edge_weights]
+    return (
+        is_transformed()
+        or is_recorded()
+        or torch.is_inference_mode_enabled()
+        or any(t.is_inference() or t.requires_grad or unpack_dual(t).tangent is not None for t in inputs)
+    )
 
 
 def _check_normals(normals: Tensor, vertices: Tensor) -> None:
