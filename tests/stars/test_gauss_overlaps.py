@@ -86,6 +86,16 @@ def test_degenerate_meshes_have_an_answer(make: object) -> None:
     assert gauss_overlaps(*make()).crossings >= 0  # type: ignore[operator]
 
 
+def test_the_limit_is_half_of_the_pairs_that_are_told_in_both_orders() -> None:
+    vertices, topology = wavy_grid(9, 8)
+    with pytest.raises(MeshError, match="most_pairs") as told:
+        gauss_overlaps(vertices, topology, most_pairs=0)
+    pairs = int(str(told.value).split(" pairs of arcs")[0].split()[-1])
+    gauss_overlaps(vertices, topology, most_pairs=-(-pairs // 2))
+    with pytest.raises(MeshError, match=f"has {pairs} pairs"):
+        gauss_overlaps(vertices, topology, most_pairs=-(-pairs // 2) - 1)
+
+
 def test_refusals() -> None:
     vertices, topology = wavy_grid(9, 8)
     with pytest.raises(MeshError, match="most_pairs"):
