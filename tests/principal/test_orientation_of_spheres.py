@@ -27,6 +27,16 @@ def test_normals_point_to_where_neighbours_run_counterclockwise(height: float, t
     torch.testing.assert_close(other.curvatures, -found.curvatures)
 
 
+def test_the_order_of_neighbours_decides_the_side_on_uneven_rings() -> None:
+    """An uneven ring whose first three sums of spokes lie clockwise."""
+    angles = torch.tensor([2.45, 2.64, 5.59, 5.94], dtype=DOUBLE)
+    radii, heights = torch.tensor([[0.5, 0.88, 0.97, 0.51], [-0.48, -1.06, -0.29, -0.57]], dtype=DOUBLE)
+    ring = torch.stack([radii * angles.cos(), radii * angles.sin(), heights], dim=1)
+    found = spheres_through(torch.zeros(3, dtype=DOUBLE), ring)
+    across = torch.linalg.cross(ring[0] - ring[2], ring[1] - ring[3])
+    assert float(across @ found.normals) > 0.0
+
+
 def test_faces_with_two_marked_sides_take_that_of_their_neighbours() -> None:
     rule = differences(Topology.from_faces(split_quads(grid_faces(5, 5))))
     sides = spread(rule, torch.tensor([7]).numpy(), torch.tensor([1]).numpy())
