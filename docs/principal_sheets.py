@@ -78,9 +78,9 @@ def labelled() -> dict[str, tuple[Tensor, PrincipalEdges]]:
     spoke = five.edges.tolist().index([0, 2])
     return {
         "a lattice": (lattice.vertices, principal_edges_of_lattice(lattice)),
-        "from one edge, singular vertex of valence 9": (saddle, coarse),
+        "one vertex of valence 9": (saddle, coarse),
         "refined": (step.apply(saddle), coarse.refine(step)),
-        "valence 5: exceptions along a seam": (
+        "valence 5: a seam": (
             lifted(bowl, 0, -1.5),
             principal_edges_from_seed(five, spoke, allow_exceptions=True),
         ),
@@ -105,7 +105,7 @@ def draw_labels(path: Path) -> None:
         base = torch.where(beside[:, None], torch.tensor(EXCEPTION), torch.tensor(FRONT)).double()
         left = MARGIN + column * CELL
         sheet.image(picture.paint(shade_faces(vertices, topology, camera, base), edges=style), left + 12, MARGIN)
-        sheet.text(words, left + CELL / 2, MARGIN + HEIGHT + CAPTION / 2, 18, ha="center", va="center")
+        sheet.text(words, left + CELL / 2, MARGIN + HEIGHT + CAPTION / 2, 28, ha="center", va="center")
     sheet.write(path, overwrite=True)
 
 
@@ -133,7 +133,7 @@ def draw_strips(path: Path) -> None:
     _flat(sheet, strips, MARGIN + width + 24, MARGIN, width - 24, body)
     for column, words in enumerate(("strips along principal edges", "the same strips on a sheet")):
         place = MARGIN + (column + 0.5) * width
-        sheet.text(words, place, MARGIN + body + CAPTION / 2, 20, ha="center", va="center")
+        sheet.text(words, place, MARGIN + body + CAPTION / 2, 28, ha="center", va="center")
     sheet.write(path, overwrite=True)
 
 
