@@ -37,7 +37,7 @@ html_js_files = ["copy.js", "breaks.js"]
 mathjax_path = "mathjax/startup.js"  # docs/vendor_mathjax.py says where it is from
 mathjax3_config = {
     "loader": {"load": ["input/tex", "output/chtml"]},
-    "options": {"processHtmlClass": "tex2jax_process|mathjax_process|math|output_area", "enableMenu": False},
+    "options": {"processHtmlClass": "tex2jax_process|mathjax_process|math|output_area"},
 }
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"

@@ -8,3 +8,7 @@ for (const code of document.querySelectorAll("article table code")) {
     node.replaceWith(...parts.flatMap((part, i) => (i ? [document.createElement("wbr"), part] : [part])));
   }
 }
+// Cells of a few numbers are not broken.
+for (const cell of document.querySelectorAll("article td")) {
+  if (/^\d.{0,13}$/.test(cell.textContent.trim())) cell.style.whiteSpace = "nowrap";
+}
