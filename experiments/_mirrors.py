@@ -75,21 +75,31 @@ def panel_width(width: int, columns: int) -> int:
 
 
 def panels(rows: list[list[Tensor]], width: int, captions: dict[str, list[str]]) -> Sheet:
-    """A page of pictures; below each column its name and further words in grey."""
+    """A page of pictures; below each column its name, in two lines where it is long, and further words in grey."""
     height, panel = rows[0][0].shape[:2]
-    lines = max(map(len, captions.values()))
-    size = min(34, 1.6 * panel / max(map(len, captions)))
-    sheet = Sheet(width, MARGIN + len(rows) * (height + GAP) + CAPTION + int(lines * 1.3 * size) + GAP // 2)
+    names, lines = [_in_lines(name) for name in captions], max(map(len, captions.values()))
+    size = min(34, 1.6 * panel / max(len(line) for name in names for line in name))
     below = MARGIN + len(rows) * (height + GAP)
-    for column, (name, words) in enumerate(captions.items()):
+    under = below + CAPTION + int(1.2 * size * (max(map(len, names)) - 1))
+    sheet = Sheet(width, under + int(lines * 1.3 * size) + GAP // 2)
+    for column, (name, words) in enumerate(zip(names, captions.values(), strict=True)):
         left = MARGIN + column * (panel + GAP)
         for number, row in enumerate(rows):
             sheet.image(row[column], left, MARGIN + number * (height + GAP))
-        sheet.text(name, left + panel / 2, below + CAPTION / 2, size, ha="center", va="center")
+        sheet.text("\n".join(name), left + panel / 2, (below + under) / 2, size, ha="center", va="center")
         for line, text in enumerate(words):
-            place = below + CAPTION + (line + 0.5) * 1.3 * size
+            place = under + (line + 0.5) * 1.3 * size
             sheet.text(text, left + panel / 2, place, 0.8 * size, FAINT_TEXT, ha="center", va="center")
     return sheet
+
+
+def _in_lines(name: str, most: int = 16) -> list[str]:
+    """A name that is longer than that in two lines, as even as its words allow."""
+    words = name.split()
+    if len(name) <= most or len(words) == 1:
+        return [name]
+    ways = [[" ".join(words[:count]), " ".join(words[count:])] for count in range(1, len(words))]
+    return min(ways, key=lambda way: max(map(len, way)))
 
 
 # ---- surroundings --------------------------------------------------------------------------------------
