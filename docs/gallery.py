@@ -34,6 +34,7 @@ PICTURES = {
     "fig18_hybrid_roof": "overlay.png",
     "fig21_principal_remeshing": "edges.png",
     "fig_reflection_ranking": "reflections.png",
+    "inverse_design": "points.png",
     "optimise_reflection": "reflections.png",
     "polar_duals": "dual.png",
     "repair_saddles": "saddle_term.png",

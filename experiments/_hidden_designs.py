@@ -52,12 +52,14 @@ class Design:
         recipe: With handles where they start.
         hidden: (h, 3) targets that do what is wanted.
         loss: Of the finished vertices; 0 at the hidden design.
+        points: (n, 3) that the mesh is to pass through, if that is what is wanted.
     """
 
     name: str
     recipe: FormRecipe | FairRecipe
     hidden: Tensor
     loss: Callable[[Tensor], Tensor]
+    points: Tensor | None = None
 
 
 def hidden_places(vertices: Tensor, chosen: Tensor, reach: float) -> Tensor:
@@ -93,12 +95,16 @@ def through_points(config: Config) -> Design:
 
     def loss(found: Tensor) -> Tensor:
         """Mean squared distance of the points from the mesh, in mean edges squared."""
-        surface = ReferenceSurface(found, topology)
-        closest = surface.closest(points)
-        feet = (closest.weights[:, :, None] * found[surface.pieces[closest.pieces]]).sum(1)
-        return ((feet - points) / unit).square().sum(1).mean()
+        return ((feet_of(points, found, topology) - points) / unit).square().sum(1).mean()
 
-    return Design("points", recipe, hidden, loss)
+    return Design("points", recipe, hidden, loss, points)
+
+
+def feet_of(points: Tensor, vertices: Tensor, topology: Topology) -> Tensor:
+    """The places (n, 3) of a mesh of triangles that are closest to the points, functions of its vertices."""
+    surface = ReferenceSurface(vertices, topology)
+    closest = surface.closest(points)
+    return (closest.weights[:, :, None] * vertices[surface.pieces[closest.pieces]]).sum(1)
 
 
 def wavy_ring(radius: float, height: float) -> ClosedCurve:

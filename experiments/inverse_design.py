@@ -15,20 +15,22 @@ import time
 from typing import Literal
 
 import torch
-from _charts import BLUE, GREEN, ORANGE, add_chart, add_legend
+from _charts import BLUE, GREEN, ORANGE, RED, add_chart, add_legend
 from _common import Report, Results, run_experiment
-from _hidden_designs import FREQUENCY, STRIPES, Config, Design, mirroring, through_points
+from _hidden_designs import FREQUENCY, STRIPES, Config, Design, feet_of, mirroring, through_points
 from _mirrors import Mirror, mirror_picture, panel_width, panels, striped
 from torch import Tensor
 
 from torchfair.errors import DerivativeError
 from torchfair.formfinding import JobLayer
 from torchfair.geometry import vertex_normals
-from torchfair.viewing import fit_camera
-from torchfair.viewing.sheet import Sheet
+from torchfair.viewing import MeshView, fit_camera, view_direction
+from torchfair.viewing.shading import shade_faces
+from torchfair.viewing.sheet import CAPTION, GAP, MARGIN, Sheet, points
+from torchfair.viewing.wireframe import quiet_edges
 
 NAME = "inverse_design"
-PICTURE, CHART = "reflections.png", "losses.png"
+PICTURE, POINTS, CHART = "reflections.png", "points.png", "losses.png"
 MESHES = ("points_start.obj", "points_found.obj", "reflection_start.obj", "reflection_found.obj")
 IMPLICIT, UNROLLED, DIFFERENCES = "implicit", "unrolled", "finite differences"
 WAYS = (IMPLICIT, UNROLLED, DIFFERENCES)
@@ -174,11 +176,34 @@ def draw_losses(designs: dict[str, Report], results: Results) -> None:
     sheet.write(results.path(CHART), overwrite=results.force)
 
 
+def draw_points(meshes: dict[str, Tensor], design: Design, width: int, results: Results) -> None:
+    """The points, joined in red to the places of each mesh that are closest to them."""
+    assert design.points is not None, "this design has no points"
+    topology, unit = design.recipe.topology, design.recipe.unit.length
+    towards_eye, up = view_direction(meshes["hidden design"], topology)
+    panel = panel_width(width, len(meshes))
+    camera, size = fit_camera(*meshes.values(), towards_eye=towards_eye, up=up, width=panel)
+    sheet = Sheet(width, CAPTION + size[0] + 2 * MARGIN)
+    for column, (name, vertices) in enumerate(meshes.items()):
+        left = MARGIN + column * (panel + GAP)
+        mesh, feet = MeshView(vertices, topology, camera, size), feet_of(design.points, vertices, topology)
+        off = float((feet - design.points).square().sum(1).mean().sqrt()) / unit
+        sheet.caption(f"{name}: points off by {off:.2f} mean edges", left, 0, panel)
+        axes = sheet.axes(left, CAPTION, size[1], size[0])
+        axes.set_axis_off()
+        picture = mesh.paint(shade_faces(vertices, topology, camera), edges=quiet_edges(mesh))
+        axes.imshow(picture.clamp(0, 1), extent=(0, size[1], size[0], 0), interpolation="none")
+        ends = torch.stack([camera.project(places, size)[0] for places in (design.points, feet)])[..., :2]
+        axes.plot(*ends.unbind(-1), color=RED, linewidth=points(6))
+        axes.plot(*ends[0].T, "o", color=BLUE, markersize=points(13), markeredgecolor="white")
+    sheet.write(results.path(POINTS), overwrite=results.force)
+
+
 def draw_reflections(meshes: dict[str, Tensor], design: Design, config: Config, results: Results) -> None:
     """Stripes of both directions in the start, what was found, and what was wanted."""
     topology = design.recipe.topology
     camera, pixels = fit_camera(
-        meshes["wanted"], towards_eye=torch.tensor([0.4, -0.5, 1.0]), up=torch.tensor([0.0, 0.0, 1.0]),
+        meshes["hidden design"], towards_eye=torch.tensor([0.4, -0.5, 1.0]), up=torch.tensor([0.0, 0.0, 1.0]),
         width=panel_width(config.width, len(meshes)), margin=0.02,
     )  # fmt: skip
     mirrors = [Mirror(mesh, topology, vertex_normals(mesh, topology)) for mesh in meshes.values()]
@@ -207,17 +232,18 @@ def experiment(config: Config, results: Results) -> Report:
         start, _ = JobLayer(design.recipe)()
         results.mesh(f"{design.name}_start.obj", start, design.recipe.topology)
         results.mesh(f"{design.name}_found.obj", found[IMPLICIT], design.recipe.topology)
-        if design.name == "reflection":
-            draw_reflections(
-                {"start": start, "found": found[IMPLICIT], "wanted": wanted_mesh(design)}, design, config, results
-            )
+        meshes = {"start": start, "found": found[IMPLICIT], "hidden design": wanted_mesh(design)}
+        if design.points is not None:
+            draw_points(meshes, design, config.width, results)
+        else:
+            draw_reflections(meshes, design, config, results)
     draw_losses(designs, results)
     return {"designs": designs}
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The experiment from the command line."""
-    return run_experiment(NAME, __doc__, Config, experiment, [PICTURE, CHART, *MESHES], arguments)
+    return run_experiment(NAME, __doc__, Config, experiment, [PICTURE, POINTS, CHART, *MESHES], arguments)
 
 
 if __name__ == "__main__":
