@@ -33,9 +33,10 @@ class CommandParser(argparse.ArgumentParser):
         if fill is not None:
             fill(self)
         words = list(sys.argv[1:] if not args or args[0] is None else args[0])
-        parsed, unknown = super().parse_known_args(joined_places(with_default_tolerance(words)), *args[1:], **kwargs)
-        vars(parsed).setdefault("options", tuple(self._option_string_actions))  # those of a command come first
-        return parsed, unknown
+        parsed: Any = super().parse_known_args(joined_places(with_default_tolerance(words)), *args[1:], **kwargs)
+        if not hasattr(parsed[0], "options"):  # those of a command come first
+            parsed[0].options = tuple(self._option_string_actions)
+        return parsed
 
     def error(self, message: str) -> NoReturn:
         """Refuses the arguments."""

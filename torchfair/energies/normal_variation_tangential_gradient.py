@@ -85,8 +85,13 @@ def _is_followed(vertices: Tensor, edge_weights: Tensor | None) -> bool:
         is_transformed()
         or is_recorded()
         or torch.is_inference_mode_enabled()
-        or any(t.is_inference() or t.requires_grad or unpack_dual(t).tangent is not None for t in inputs)
+        or any(t.is_inference() or t.requires_grad or _is_dual(t) for t in inputs)
     )
+
+
+def _is_dual(numbers: Tensor) -> bool:
+    tangent: Tensor | None = unpack_dual(numbers).tangent  # type: ignore[no-untyped-call]
+    return tangent is not None
 
 
 def _check_normals(normals: Tensor, vertices: Tensor) -> None:
