@@ -75,12 +75,13 @@ class _Splitter:
         ties: dict[int, Row] = {2 * v + k: {at + k: 1} for v, at in self.place.items() for k in (0, 1)}
         rows: list[Row] = []
         for number, run in enumerate(self.runs):
-            for corner in run.corners:
-                at = 2 * int(self.seams.copies[corner]) + run.component
-                unknown, sign = int(values[[at]].indices[0]), int(values[[at]].data[0])
+            faces, corners = np.array(run.corners).T
+            for at in (2 * self.seams.copies[faces, corners] + run.component).tolist():
+                unknown, sign = int(values.indices[at]), int(values.data[at])  # one entry a row
                 row = {self.first_run + number: sign}
-                for path, factor in zip(steps[[at]].indices, steps[[at]].data, strict=True):
-                    row[self.first_path + int(path)] = -sign * int(factor)
+                terms = slice(steps.indptr[at], steps.indptr[at + 1])
+                for path, factor in zip(steps.indices[terms].tolist(), steps.data[terms].tolist(), strict=True):
+                    row[self.first_path + path] = -sign * int(factor)
                 if unknown in ties:
                     rows.append(_difference(row, ties[unknown]))
                 else:
