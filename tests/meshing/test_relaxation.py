@@ -15,7 +15,7 @@ from torchfair.meshing import MeshingSettings, ladder
 from torchfair.meshing.attempt import FailedAttemptError, Plan
 from torchfair.meshing.components import read_surface
 from torchfair.meshing.cut_graph import CutGraph, cut_open
-from torchfair.meshing.ladder import NoMeshError, mesh_component
+from torchfair.meshing.ladder import Again, NoMeshError, mesh_component
 from torchfair.meshing.lattice import SQUARES
 from torchfair.meshing.relaxation import loosened, stretched
 from torchfair.meshing.separation import gaps, separate_vectors
@@ -98,7 +98,7 @@ def test_a_search_can_begin_with_a_later_plan() -> None:
     given = surface.parts[0], surface.fields[0], SQUARES, 0.5, 0.25, MeshingSettings()
     _, words, plan = mesh_component(*given)
     assert (words, plan) == ("", 0)
-    _, words, plan = mesh_component(*given, first=1)
+    _, words, plan = mesh_component(*given, Again(1, 0.5))
     assert (words, plan) == ("boundary not aligned", 1)
 
 
@@ -113,7 +113,7 @@ def test_with_another_spacing_only_plans_of_the_same_size_are_tried(monkeypatch:
     surface = read_surface(*irregular(PrincipalParaboloid(), 600), MeshingSettings())
     given = surface.parts[0], surface.fields[0], SQUARES, 0.5, 0.25, MeshingSettings()
     with pytest.raises(NoMeshError, match="5 setting"):
-        mesh_component(*given, first=3)
+        mesh_component(*given, Again(3, 0.5))
     assert {plan.spacing for plan in tried} == {0.5}
     tried.clear()
     with pytest.raises(NoMeshError):

@@ -23,6 +23,7 @@ from ..fields.matchings import QUARTER
 from .creases import Creases, crease_pull
 from .cut_graph import CutGraph, cut_open
 from .even_crosses import even_crosses
+from .node_room import with_room
 
 _FIRM = 10.0  # weight of creases that the field follows
 
@@ -82,6 +83,7 @@ def combed(
             matched = matchings(frames, angles, of)
             sharpness = int((vertex_charges(frames, angles, matched) ** 2).sum())
             angles, matched = merge_singularities(frames, angles, matched, directions, smoothing, merging, of, stay)
+            angles, matched = with_room(frames, angles, matched, directions, smoothing, merging, of, stay)
             charges = vertex_charges(frames, angles, matched)
             graphs.append((sharpness, cut_open(frames, angles, matched, charges)))
         graph = min(graphs, key=lambda rated: rated[0])[1]

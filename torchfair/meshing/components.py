@@ -21,7 +21,7 @@ from ..topology import Topology
 from .attempt import PieceMesh
 from .curvature_sizes import CurvatureSizes
 from .curved_surface import on_curved_surface
-from .ladder import mesh_component
+from .ladder import Again, mesh_component
 from .lattice import Lattice
 from .mesh_creases import MeshCreases
 from .sizes import SizeField
@@ -164,8 +164,7 @@ def mesh_components(
     lattices: list[Lattice],
     spacing: float,
     settings: MeshingSettings,
-    first: list[int] | None = None,
-    resolution: float | None = None,
+    again: list[Again] | None = None,
 ) -> Pieces:
     """Meshes every component with a lattice.
 
@@ -174,8 +173,7 @@ def mesh_components(
         lattices: of the components.
         spacing: length of edges.
         settings: of the meshes.
-        first: number of the plan of every component that gave a mesh with another spacing; by default none has.
-        resolution: length of edges for which triangles are made fine enough, by default the spacing.
+        again: what is kept of meshes of the components with another spacing; by default there are none.
 
     Raises:
         NoMeshError: if one has no valid mesh.
@@ -186,10 +184,8 @@ def mesh_components(
     parts = surface.parts if sizes is None else surface.sized(sizes.field)
     for number, (part, directions) in enumerate(zip(parts, surface.fields, strict=True)):
         smoothing = settings.smoothing_length(surface.fits[number].rings)
-        begin = None if first is None else first[number]
-        mesh, words, plan = mesh_component(
-            part, directions, lattices[number], spacing, smoothing, settings, begin, resolution
-        )
+        kept = None if again is None else again[number]
+        mesh, words, plan = mesh_component(part, directions, lattices[number], spacing, smoothing, settings, kept)
         taken.append(plan)
         if words:
             name = _name(number, len(surface.parts))

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from ..settings.meshing_settings import MeshingSettings
 from .components import Pieces, ReadSurface, mesh_components
-from .ladder import NoMeshError
+from .ladder import Again, NoMeshError
 from .lattice import Lattice
 
 _CORRECTIONS = 4
@@ -18,7 +18,8 @@ _ENOUGH = 0.08  # by which the count may differ, relative, so that no other spac
 _FAR = 0.25  # beyond that other settings are taken for the sake of the count
 _SAID = 0.15  # by which it may differ without a word
 _INSIDE = 0.2  # of the logarithms between two spacings: a third one keeps so far from both
-_FINER = 0.8  # of the first spacing, below which triangles are cut finer than for it
+_FINER = 0.7  # of the first spacing, below which triangles are cut finer than for it
+_SAME = 0.01  # by which spacings differ, relative: what failed with one will fail with the other
 _ROUNDING = 1e-9
 
 
@@ -51,15 +52,19 @@ def mesh_to_count(
     if count is None:
         return best, spacing
     first, tried, step, began = spacing, [(spacing, faces_of(best))], 1.0, time.process_time()
+    failed: list[float] = []
     short = replace(settings, time_limit=settings.time_limit * _SHARE)
     for _ in range(_CORRECTIONS):
         off = abs(faces_of(best) / count - 1)
         if off <= _ENOUGH or time.process_time() - began > 2 * short.time_limit:
             break
         other = spacing * (next_spacing(tried, count) / spacing) ** step
+        if any(abs(other / before - 1) < _SAME for before in failed):
+            break
         again = _again(surface, lattices, (other, first), short, best, off)
         if again is None:
             step /= 2
+            failed.append(other)
             continue
         tried.append((other, faces_of(again)))
         if abs(faces_of(again) / count - 1) < off:
@@ -95,7 +100,8 @@ def _again(
     spacing, first = spacings
     resolution = first if spacing > _FINER * first else spacing
     try:
-        again = mesh_components(surface, lattices, spacing, settings, best.plans, resolution)
+        kept = [Again(plan, resolution, others=off > _FAR) for plan in best.plans]
+        again = mesh_components(surface, lattices, spacing, settings, kept)
     except NoMeshError:
         return None
     lost = again.creases.length < (1 - _ROUNDING) * best.creases.length

@@ -19,15 +19,12 @@ from .combing import combed
 from .creases import Creases, find_creases
 from .cut_graph import CutGraph
 from .lattice import Lattice
+from .plans import Kind, Rung, plans
 from .surface import DesignSurface
 
-_SMOOTHER = (1.0, 4.0, 16.0, 64.0)  # times the smoothing length
-_ROWS = ((1.0, 0.0), (1.0, 0.3), (1.0, 10.0), (4.0, 0.0), (1.0, 0.3), (1.0, 10.0), (16.0, 0.0), (64.0, 0.0))
-"""The same for lattices with rows, and how crosses are made even; at first where the plan before failed by far."""
-
+_PATHS = 1.3  # times the merging length of quads: paths along edges are longer than straight ones
 _SHARE = 0.5  # of the time limit, for plans that keep creases
 _RETRIES = 2  # with creases not aligned where a map is turned over
-_SPACINGS = (1.0, 0.967, 1.037, 0.934, 1.08)  # counts up and down by 7 and 15 %
 
 
 class NoMeshError(MeshError):
@@ -42,30 +39,18 @@ class NoMeshError(MeshError):
         self.vertex = vertex
 
 
-Kind = tuple[float, bool, bool, float]
-
-
-class Rung(NamedTuple):
-    """A plan, how in words it differs from what was asked for, and by which factors.
+class Again(NamedTuple):
+    """How a component that has a mesh is meshed with another spacing.
 
     Attributes:
-        early: whether it is for surfaces on which the same without even crosses failed by far.
+        plan: number of the plan that gave the mesh; only plans of its size follow.
+        resolution: length of edges for which triangles are made fine enough.
+        others: whether any may follow, or only what was done before will do.
     """
 
-    plan: Plan
-    words: str
-    scale: float
-    smoother: float
-    early: bool
-
-    @property
-    def kind(self) -> Kind:
-        """What it has in common with plans of a spacing a little different."""
-        return self.smoother, self.plan.align, self.plan.creases, self.plan.even
-
-    def is_worth_it(self, hopeless: set[Kind]) -> bool:
-        """Whether to try it when plans of some kinds failed by far."""
-        return self.kind not in hopeless and (not self.early or (*self.kind[:3], 0.0) in hopeless)
+    plan: int
+    resolution: float
+    others: bool = True
 
 
 def mesh_component(
@@ -75,8 +60,7 @@ def mesh_component(
     spacing: float,
     smoothing: float,
     settings: MeshingSettings,
-    first: int | None = None,
-    resolution: float | None = None,
+    again: Again | None = None,
 ) -> tuple[PieceMesh, str, int]:
     """The mesh of a component by the first plan that gives a valid one, what was changed, and the plan's number.
 
@@ -87,111 +71,114 @@ def mesh_component(
         spacing: length of edges.
         smoothing: of directions, over the spacing.
         settings: of the mesh.
-        first: number of the plan to begin with, which gave a mesh with another spacing; then spacings are not changed.
-        resolution: length of edges for which triangles are made fine enough, by default the spacing.
+        again: what is kept of a mesh with another spacing.
 
     Raises:
         NoMeshError: if none does.
     """
-    creased = bool(surface.sharp.any())
-    plain = surface.without_creases()
+    resolution = spacing if again is None else again.resolution
+    prepared = _Prepared(surface, directions, lattice, settings, resolution)
+    rungs = list(plans(spacing, smoothing, settings, bool(surface.sharp.any()), lattice.has_rows))
     began = time.process_time()
-    failure: FailedAttemptError | None = None
-    number = 0
+    failures: list[FailedAttemptError] = []
+    hopeless: set[Kind] = set()
+    done: set[tuple[float, Kind]] = set()
+    for number, rung in _numbered(rungs, again):
+        limit = settings.time_limit * (_SHARE if rung.plan.creases else 1.0)
+        late = time.process_time() - began > limit
+        repeats = (rung.scale, rung.kind) in done
+        if failures and (not settings.fallback or late or repeats or not rung.is_worth_it(hopeless)):
+            continue
+        done.add((rung.scale, rung.kind))
+        found = _with_retries(prepared, rung, failures)
+        if found is not None:
+            return *found, number
+        if failures[-1].hopeless:
+            hopeless.add(rung.kind)
+    placed = [failure for failure in failures if failure.vertex >= 0]
+    told = placed[0] if placed else failures[-1]
+    raise NoMeshError(_refusal(told, len(failures)), told.vertex)
 
-    @cache
-    def finer(kept: bool) -> tuple[DesignSurface, Directions]:
-        length = spacing if resolution is None else resolution
-        if kept or not creased:
-            return surface.cut_finer(directions, length)
-        return plain.cut_finer(smooth(), length)
 
-    @cache
-    def smooth() -> Directions:
-        return plain.directions(settings.noise)[0]
+class _Prepared:
+    """What attempts at a component share, each thing made once.
 
-    @cache
-    def creases(spacing: float, kept: bool) -> Creases:
-        triangles = finer(kept)[0]
-        return find_creases(triangles.frames, triangles.sharp, settings.corner_angle, spacing)
+    Attributes:
+        surface, directions, lattice, settings: of :func:`mesh_component`.
+        resolution: length of edges for which triangles are made fine enough.
+    """
 
-    @cache
-    def graph(spacing: float, smoothing: float, kept: bool, even: float) -> CutGraph:
-        triangles, carried = finer(kept)
-        merging, sharp, angle = settings.merging * spacing, creases(spacing, kept), settings.boundary_angle
+    def __init__(
+        self,
+        surface: DesignSurface,
+        directions: Directions,
+        lattice: Lattice,
+        settings: MeshingSettings,
+        resolution: float,
+    ) -> None:
+        self.surface, self.directions, self.resolution = surface, directions, resolution
+        self.lattice, self.settings = lattice, settings
+        self._finer, self._creases, self._graph = cache(self._cut_finer), cache(self._find_creases), cache(self._combed)
+
+    def attempt(self, plan: Plan) -> PieceMesh:
+        """The mesh as planned.
+
+        Raises:
+            FailedAttemptError: if there is none.
+        """
+        graph = self._graph(plan.spacing, plan.smoothing, plan.creases, plan.even)
+        creases, triangles = self._creases(plan.spacing, plan.creases), self._finer(plan.creases)[0]
+        return attempt(triangles, creases, graph, self.lattice, plan, self.settings)
+
+    def _cut_finer(self, kept: bool) -> tuple[DesignSurface, Directions]:
+        if kept or not self.surface.sharp.any():
+            return self.surface.cut_finer(self.directions, self.resolution)
+        plain = self.surface.without_creases()
+        return plain.cut_finer(plain.directions(self.settings.noise)[0], self.resolution)
+
+    def _find_creases(self, spacing: float, kept: bool) -> Creases:
+        triangles = self._finer(kept)[0]
+        return find_creases(triangles.frames, triangles.sharp, self.settings.corner_angle, spacing)
+
+    def _combed(self, spacing: float, smoothing: float, kept: bool, even: float) -> CutGraph:
+        triangles, directions = self._finer(kept)
+        merging = self.settings.merging * spacing * (1.0 if self.lattice.has_rows else _PATHS)
+        creases = self._creases(spacing, kept)
+        angle, symmetry = self.settings.boundary_angle, self.lattice.symmetry
         try:
-            return combed(triangles.frames, carried, lattice.symmetry, smoothing, merging, sharp, angle, even=even)
+            return combed(triangles.frames, directions, symmetry, smoothing, merging, creases, angle, even=even)
         except MeshError as error:
             raise FailedAttemptError(str(error), hopeless=True) from None
 
-    hopeless: set[Kind] = set()
-    done: set[tuple[float, Kind]] = set()
-    for place, rung in _from(first, list(plans(spacing, smoothing, settings, creased, lattice.has_rows))):
-        plan = rung.plan
-        limit = settings.time_limit * (_SHARE if plan.creases else 1.0)
-        late = time.process_time() - began > limit
-        again = (rung.scale, rung.kind) in done
-        if number and (not settings.fallback or late or again or not rung.is_worth_it(hopeless)):
-            continue
-        done.add((rung.scale, rung.kind))
-        for _ in range(1 + _RETRIES * (settings.fallback and plan.creases and plan.align)):
-            number += 1
-            try:
-                field = graph(plan.spacing, plan.smoothing, plan.creases, plan.even)
-                sharp = creases(plan.spacing, plan.creases)
-                triangles = finer(plan.creases)[0]
-                return attempt(triangles, sharp, field, lattice, plan, settings), _in_words(plan, rung.words), place
-            except FailedAttemptError as error:
-                failure = error if failure is None or failure.vertex < 0 else failure
-                if error.hopeless:
-                    hopeless.add(rung.kind)
-                if error.place is None or error.hopeless:
-                    break
-                plan = replace(plan, apart=np.concatenate([plan.apart, error.place[None]]))
-    assert failure is not None
-    raise NoMeshError(_refusal(failure, number), failure.vertex)
+
+def _with_retries(prepared: _Prepared, rung: Rung, failures: list[FailedAttemptError]) -> tuple[PieceMesh, str] | None:
+    """The mesh of a plan and what was changed in words, also without creases as lines where it failed; or failures."""
+    plan = rung.plan
+    for _ in range(1 + _RETRIES * (prepared.settings.fallback and plan.creases and plan.align)):
+        try:
+            return prepared.attempt(plan), _in_words(plan, rung.words)
+        except FailedAttemptError as error:
+            failures.append(error)
+            if error.place is None or error.hopeless:
+                break
+            plan = replace(plan, apart=np.concatenate([plan.apart, error.place[None]]))
+    return None
 
 
-def _from(first: int | None, rungs: list[Rung]) -> Iterator[tuple[int, Rung]]:
-    """Numbers of plans and plans: all of them, or those from the first on that differ from it in neither size."""
-    begin = rungs[first or 0]
-    for place, rung in itertools.islice(enumerate(rungs), first, None):
-        if first is None or (rung.scale, rung.plan.creases) == (begin.scale, begin.plan.creases):
-            yield place, rung
+def _numbered(rungs: list[Rung], again: Again | None) -> Iterator[tuple[int, Rung]]:
+    """Numbers of plans and plans: all of them, or those from one on that differ from it in neither size."""
+    if again is None:
+        yield from enumerate(rungs)
+        return
+    begin = rungs[again.plan]
+    for number, rung in itertools.islice(enumerate(rungs), again.plan, None if again.others else again.plan + 1):
+        if (rung.scale, rung.plan.creases) == (begin.scale, begin.plan.creases):
+            yield number, rung
 
 
 def _in_words(plan: Plan, words: str) -> str:
     places = ", ".join(f"({x:.3g}, {y:.3g}, {z:.3g})" for x, y, z in plan.apart)
     return ", ".join(filter(None, [words, f"creases not aligned near {places}" if places else ""]))
-
-
-def plans(
-    spacing: float, smoothing: float, settings: MeshingSettings, creased: bool = False, rows: bool = False
-) -> Iterator[Rung]:
-    """What is tried, one after the other; without the creases at last, where there are any.
-
-    Args:
-        spacing: length of edges.
-        smoothing: of directions, over the spacing.
-        settings: of the mesh.
-        creased: whether there are creases.
-        rows: whether the lattice has rows, which may follow either of two principal directions.
-    """
-    for kept in (True, False) if creased else (False,):
-        can_align = settings.align_boundary or kept
-        curves = "boundary and creases" if kept else "boundary"
-        for scale in _SPACINGS:
-            for number, (smoother, even) in enumerate(_ROWS if rows else [(of, 0.0) for of in _SMOOTHER]):
-                for align in (True, False) if can_align else (False,):
-                    words = [
-                        "creases not kept" if creased and not kept else "",
-                        f"directions smoothed over {smoothing * smoother:g} edges" if smoother != 1 else "",
-                        "rows not along the same principal curvature everywhere" if even else "",
-                        f"{curves} not aligned" if can_align and not align else "",
-                        f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces" if scale != 1 else "",
-                    ]
-                    plan = Plan(spacing * scale, spacing * smoothing * smoother, align, kept, even)
-                    yield Rung(plan, ", ".join(filter(None, words)), scale, smoother, even > 0 and number < 3)
 
 
 def _refusal(failure: FailedAttemptError, number: int) -> str:
