@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 import torch
@@ -10,8 +12,9 @@ from creased_shapes import box
 
 from torchfair import Topology
 from torchfair.fields import Directions
-from torchfair.meshing import principal_quads
-from torchfair.meshing.counts import next_spacing
+from torchfair.meshing import MeshingSettings, counts, principal_quads
+from torchfair.meshing.counts import mesh_to_count, next_spacing
+from torchfair.meshing.ladder import Again, NoMeshError
 from torchfair.meshing.surface import DesignSurface
 from torchfair.shapes import example_roof
 
@@ -79,3 +82,44 @@ def test_spacings_near_the_first_are_laid_on_the_same_triangles(monkeypatch: pyt
     principal_quads(*example_roof(), count=200)
     assert len(asked) > 1
     assert all(length == asked[0] or length < 0.8 * asked[0] for length in asked)
+
+
+def corrected(monkeypatch: pytest.MonkeyPatch, count: int, faces: Any) -> tuple[int, list[tuple[float, list[Again]]]]:
+    """Faces in the end, and what was asked for to come to a count, where a spacing gives ``faces(spacing)``."""
+    asked: list[tuple[float, list[Again]]] = []
+
+    def made(_surface: Any, _lattices: Any, spacing: float, _settings: Any, again: list[Again] | None = None) -> Any:
+        if again is not None:
+            asked.append((spacing, again))
+        if faces(spacing) is None:
+            raise NoMeshError("none")
+        return SimpleNamespace(faces=faces(spacing), notes=[], plans=[3], creases=SimpleNamespace(length=0.0))
+
+    monkeypatch.setattr(counts, "mesh_components", made)
+    monkeypatch.setattr(counts, "_told", lambda pieces, *_: pieces)
+    found, _ = mesh_to_count(cast(Any, None), [], 1.0, MeshingSettings(), count, lambda pieces: cast(Any, pieces).faces)
+    return cast(Any, found).faces, asked
+
+
+@pytest.mark.parametrize(("first", "others"), [(76, False), (74, True), (124, False), (126, True)])
+def test_other_plans_are_taken_only_where_the_count_is_far_off(
+    monkeypatch: pytest.MonkeyPatch, first: int, others: bool
+) -> None:
+    found, asked = corrected(monkeypatch, 100, lambda spacing: first if spacing == 1 else 100)
+    assert found == 100
+    assert [again for _, (again,) in asked] == [Again(3, 1.0, others)]
+
+
+def test_triangles_are_cut_finer_for_spacings_that_are_much_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
+    for first, finer in ((50, False), (48, True)):
+        _, asked = corrected(monkeypatch, 100, lambda spacing, first=first: first if spacing == 1 else 100)
+        (spacing, (again,)) = asked[0]
+        assert spacing == pytest.approx(math.sqrt(first / 100))
+        assert again.resolution == (spacing if finer else 1.0)
+
+
+def test_spacings_that_failed_are_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a mesh the next spacing is half as far; with that the search came back to the one before."""
+    found, asked = corrected(monkeypatch, 100, lambda at: 85 if at > 0.99 else (86 if at > 0.93 else None))
+    assert found == 86
+    assert [spacing for spacing, _ in asked] == pytest.approx([0.85**0.5, 0.85**0.25])

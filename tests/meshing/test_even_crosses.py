@@ -86,6 +86,18 @@ def test_corners_that_stay_take_the_index() -> None:
     assert odd[np.flatnonzero(vertex_charges(frames, angles, moved))].all()
 
 
+def test_an_odd_boundary_takes_an_index_sooner_than_corners_that_stay() -> None:
+    """Crosses make an odd number of quarter turns along the boundary, and a vertex beside it has the rest."""
+    vertices, topology = irregular(PrincipalParaboloid(1.0, -0.5), 1000)
+    frames, angles, matched = crosses(vertices, topology)
+    inward = frames.edges[frames.is_boundary[frames.edges].sum(1) == 1][0]
+    start, end = sorted(inward.tolist(), key=lambda vertex: not frames.is_boundary[vertex])
+    matched = carried_charges(frames, matched, [(start, end, 1)])
+    assert vertex_charges(frames, angles, matched)[end] == 1
+    _, moved = even_crosses(frames, angles, matched, directions_of(frames), SMOOTHING, 1.0, ~frames.is_boundary)
+    assert not vertex_charges(frames, angles, moved).any()
+
+
 def test_pairs_are_changed_while_their_sum_falls() -> None:
     """On a line at 0, 1, 1.9, 2.9 the nearest pair leaves the others far apart."""
     places = np.array([0.0, 1.0, 1.9, 2.9])

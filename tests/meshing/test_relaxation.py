@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from meshing_tools import Flat, cut, ellipsoid, irregular, problem_of
 
+from torchfair import MeshError
 from torchfair.fields import FaceFrames, matchings
 from torchfair.fields.frames import Floats
 from torchfair.meshing import MeshingSettings, ladder
@@ -16,7 +17,7 @@ from torchfair.meshing.attempt import FailedAttemptError, Plan
 from torchfair.meshing.components import read_surface
 from torchfair.meshing.cut_graph import CutGraph, cut_open
 from torchfair.meshing.ladder import Again, NoMeshError, mesh_component
-from torchfair.meshing.lattice import SQUARES
+from torchfair.meshing.lattice import SQUARES, triangle_lattice
 from torchfair.meshing.relaxation import loosened, stretched
 from torchfair.meshing.separation import gaps, separate_vectors
 from torchfair.shapes import PrincipalParaboloid, Torus
@@ -121,6 +122,25 @@ def test_with_another_spacing_only_plans_of_the_same_size_are_tried(monkeypatch:
     kinds = [(plan.smoothing, plan.align) for plan in tried]
     assert kinds.count(kinds[0]) == 1  # hopeless: not tried with other spacings
     assert kinds.count(kinds[1]) == 5
+    tried.clear()
+    with pytest.raises(NoMeshError, match="one setting"):
+        mesh_component(*given, Again(3, 0.5, others=False))
+    assert len(tried) == 1
+
+
+def test_fields_that_cannot_be_made_even_are_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With another spacing they cannot, either."""
+    tried: list[float] = []
+
+    def fails(*_given: Any, even: float) -> None:
+        tried.append(even)
+        raise MeshError("no")
+
+    monkeypatch.setattr(ladder, "combed", fails)
+    surface = read_surface(*irregular(PrincipalParaboloid(), 600), MeshingSettings())
+    with pytest.raises(NoMeshError):
+        mesh_component(surface.parts[0], surface.fields[0], triangle_lattice(0.9), 0.5, 0.25, MeshingSettings())
+    assert sorted(tried) == 8 * [0.0] + [0.3, 0.3, 10.0, 10.0]  # aligned with the boundary and not
 
 
 def test_steps_go_the_way_in_which_they_are_apart() -> None:
