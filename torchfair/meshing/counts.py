@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ..settings.meshing_settings import MeshingSettings
 from .components import Pieces, ReadSurface, mesh_components
@@ -16,6 +16,7 @@ _CORRECTIONS = 4
 _SHARE = 1 / 6  # of the time limit, for a correction; all of them may take twice as long
 _ENOUGH = 0.08  # by which the count may differ, relative, so that no other spacing is tried
 _FAR = 0.25  # beyond that other settings are taken for the sake of the count
+_FINEST = 0.5  # of the first spacing: triangles are cut so fine where the count is off by more than is said below
 _SAID = 0.15  # by which it may differ without a word
 _INSIDE = 0.2  # of the logarithms between two spacings: a third one keeps so far from both
 _FINER = 0.7  # of the first spacing, below which triangles are cut finer than for it
@@ -35,7 +36,8 @@ def mesh_to_count(
 
     Directions that turn make lines diverge, so that cells are larger or smaller than the spacing says, and cells that
     the boundary clips are joined. Spacings that are not much smaller than the first are laid on the same triangles:
-    finer ones would have other counts. What comes nearest is taken; where it is off by more than 15 %, a note says so.
+    finer ones would have other counts. Where none of them comes within 15 %, all is done once more on finer triangles.
+    What comes nearest is taken; where it is off by more than 15 % still, a note says so.
 
     Args:
         surface: with its directions.
@@ -51,25 +53,80 @@ def mesh_to_count(
     best = mesh_components(surface, lattices, spacing, settings)
     if count is None:
         return best, spacing
-    first, tried, step, began = spacing, [(spacing, faces_of(best))], 1.0, time.process_time()
-    failed: list[float] = []
-    short = replace(settings, time_limit=settings.time_limit * _SHARE)
-    for _ in range(_CORRECTIONS):
-        off = abs(faces_of(best) / count - 1)
-        if off <= _ENOUGH or time.process_time() - began > 2 * short.time_limit:
-            break
-        other = spacing * (next_spacing(tried, count) / spacing) ** step
-        if any(abs(other / before - 1) < _SAME for before in failed):
-            break
-        again = _again(surface, lattices, (other, first), short, best, off)
-        if again is None:
-            step /= 2
-            failed.append(other)
-            continue
-        tried.append((other, faces_of(again)))
-        if abs(faces_of(again) / count - 1) < off:
-            best, spacing = again, other
-    return _told(best, faces_of(best), count), spacing
+    search = _Search(surface, lattices, settings, count, faces_of, time.process_time())
+    best, taken = search.corrected(best, spacing, spacing)
+    if search.off(best) > _SAID and (finer := search.laid_again(best, spacing)) is not None:
+        other, at = search.corrected(finer, spacing, _FINEST * spacing)
+        if search.off(other) <= _SAID:
+            best, taken = other, at
+    return _told(best, faces_of(best), count), taken
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What corrections of the spacing have in common.
+
+    Attributes:
+        surface, lattices, settings, count, faces_of: of :func:`mesh_to_count`.
+        began: processor time.
+    """
+
+    surface: ReadSurface
+    lattices: list[Lattice]
+    settings: MeshingSettings
+    count: int
+    faces_of: Callable[[Pieces], int]
+    began: float
+
+    def off(self, pieces: Pieces) -> float:
+        """By how much the count differs, relative."""
+        return abs(self.faces_of(pieces) / self.count - 1)
+
+    @property
+    def is_late(self) -> bool:
+        """Whether corrections have taken their share of the time."""
+        return time.process_time() - self.began > 2 * _SHARE * self.settings.time_limit
+
+    def corrected(self, best: Pieces, spacing: float, resolution: float) -> tuple[Pieces, float]:
+        """What comes nearest to the count, and its spacing, from a mesh with a spacing on triangles of a resolution."""
+        first, tried, failed, step = resolution, [(spacing, self.faces_of(best))], list[float](), 1.0
+        for _ in range(_CORRECTIONS):
+            off = self.off(best)
+            if off <= _ENOUGH or self.is_late:
+                break
+            other = spacing * (next_spacing(tried, self.count) / spacing) ** step
+            if any(abs(other / before - 1) < _SAME for before in failed):
+                break
+            again = self._again(best, other, first if other > _FINER * first else other)
+            if again is None:
+                step /= 2
+                failed.append(other)
+                continue
+            tried.append((other, self.faces_of(again)))
+            if self.off(again) < off:
+                best, spacing = again, other
+        return best, spacing
+
+    def laid_again(self, best: Pieces, spacing: float) -> Pieces | None:
+        """A mesh with the first spacing on finer triangles, by any plan that keeps what the best keeps, if any."""
+        if self.is_late:
+            return None
+        return self._made([Again(0, _FINEST * spacing)] * len(best.plans), spacing, best)
+
+    def _again(self, best: Pieces, spacing: float, resolution: float) -> Pieces | None:
+        """The mesh with another spacing; None where there is none, or none as good in all but the count."""
+        others = self.off(best) > _FAR
+        again = self._made([Again(plan, resolution, others) for plan in best.plans], spacing, best)
+        return None if again is None or (len(again.notes) > len(best.notes) and not others) else again
+
+    def _made(self, kept: list[Again], spacing: float, best: Pieces) -> Pieces | None:
+        """The mesh with another spacing, if there is one with as many creases."""
+        short = replace(self.settings, time_limit=self.settings.time_limit * _SHARE)
+        try:
+            again = mesh_components(self.surface, self.lattices, spacing, short, kept)
+        except NoMeshError:
+            return None
+        return None if again.creases.length < (1 - _ROUNDING) * best.creases.length else again
 
 
 def next_spacing(tried: list[tuple[float, int]], count: int) -> float:
@@ -86,27 +143,6 @@ def next_spacing(tried: list[tuple[float, int]], count: int) -> float:
     coarser, few = max(fewer, key=lambda pair: (pair[1], -pair[0]))
     share = min(max(math.log(count / many) / math.log(few / many), _INSIDE), 1 - _INSIDE)
     return finer * math.exp(share * math.log(coarser / finer))
-
-
-def _again(
-    surface: ReadSurface,
-    lattices: list[Lattice],
-    spacings: tuple[float, float],
-    settings: MeshingSettings,
-    best: Pieces,
-    off: float,
-) -> Pieces | None:
-    """The mesh with another spacing than the first; None where there is none, or none as good in all but the count."""
-    spacing, first = spacings
-    resolution = first if spacing > _FINER * first else spacing
-    try:
-        kept = [Again(plan, resolution, others=off > _FAR) for plan in best.plans]
-        again = mesh_components(surface, lattices, spacing, settings, kept)
-    except NoMeshError:
-        return None
-    lost = again.creases.length < (1 - _ROUNDING) * best.creases.length
-    changed = len(again.notes) > len(best.notes) and off <= _FAR
-    return None if lost or changed else again
 
 
 def _told(pieces: Pieces, found: int, count: int) -> Pieces:
