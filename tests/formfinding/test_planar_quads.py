@@ -83,6 +83,18 @@ def test_where_edges_turn_too_far_e_counts_less_and_what_is_left_is_said(saddle,
     assert f"{twice.report['angle_mean_degrees']:.2g} now" in note
 
 
+def test_faces_beyond_the_distance_limit_are_told_with_what_a_mesh_can_be_asked_for(saddle, monkeypatch):
+    """The settings of the solve, planar_distance among them, are not those of a mesh."""
+    surface, mesh = saddle
+    monkeypatch.setattr(MODULE, "PLANAR_QUADS", replace(PLANAR_QUADS, distance_limit=1e-5))
+    made, job = planar_quads(mesh, surface)
+    (of_the_job,) = (note for note in job.notes if "beyond the distance limit" in note)
+    (note,) = (note for note in made.notes if "beyond the distance limit" in note)
+    assert of_the_job.endswith("limit: planar_distance 0 to keep that")
+    assert note.endswith("limit. Ask for more faces, which are more nearly planar before")
+    assert not any("planar_distance" in note for note in made.notes)
+
+
 def test_a_solve_that_is_stopped_is_not_followed_by_another(saddle, asked, monkeypatch):
     surface, mesh = saddle
     monkeypatch.setattr(MODULE, "_TURNED", -90.0)

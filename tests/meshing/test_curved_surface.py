@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
 import pytest
 import torch
 from meshing_tools import irregular
@@ -10,6 +14,8 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair.geometry import ReferenceSurface, fitted_curvature
 from torchfair.meshing import MeshingSettings, curved_surface, principal_quads
+from torchfair.meshing.components import Pieces, ReadSurface, on_surface
+from torchfair.meshing.mesh_creases import MeshCreases
 from torchfair.shapes import Torus
 
 
@@ -80,3 +86,16 @@ def test_points_move_by_a_fifth_of_a_side_at_most() -> None:
     topology = Topology.from_faces([[0, 1, 2]])
     moved = curved_surface.on_curved_surface(point, triangle, topology, normals, operators)
     assert float((moved - point).norm()) == pytest.approx(0.2 * 2.0**0.5)
+
+
+def test_vertices_stay_where_the_curved_surface_would_flatten_a_corner() -> None:
+    flat = torch.tensor([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=torch.float64)
+    places, none = flat.new_zeros(0, 3), torch.zeros(0, 2, dtype=torch.int64)
+    creases = MeshCreases(none, flat.new_zeros(0, 2, 3))
+    pieces = Pieces(flat.numpy(), [[0, 1, 2, 3]], set(), creases, places, places[:, 0], [], [0], None)
+    for folded, corner in ((False, flat[2] + 0.1), (True, torch.tensor([0.5, 0.001, 0]))):
+        moved = flat.index_copy(0, torch.tensor([2]), corner.to(flat)[None])
+        surface = cast(ReadSurface, SimpleNamespace(curved=lambda points, moved=moved: moved))
+        found = on_surface(pieces, surface, MeshingSettings())
+        assert np.array_equal(found.positions, flat.numpy() if folded else moved.numpy())
+        assert any("flat triangles" in note for note in found.notes) == folded

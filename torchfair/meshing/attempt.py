@@ -77,7 +77,7 @@ class PieceMesh:
 
     Attributes:
         positions: (N, 3).
-        faces: nodes counterclockwise.
+        faces: nodes counterclockwise; of lattices with rows triangles.
         rows: pairs of nodes, edges with the second coordinate constant.
         creases: (C, 2) nodes of the edges along creases.
         sharp: (n, 2, 3) ends of the edges of the surface that they stand for.
@@ -127,7 +127,7 @@ def attempt(
     singular = np.flatnonzero(graph.charges)
     places, charges = frames.points[singular], graph.charges[singular]
     sharp = frames.points[frames.edges[creases.edges]]
-    return PieceMesh(whole.positions, whole.faces, rows, whole.creases, sharp, places, charges)
+    return PieceMesh(whole.positions, faces, rows, whole.creases, sharp, places, charges)
 
 
 def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:

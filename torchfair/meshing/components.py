@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from .._numbers import check_count, check_number
-from ..errors import SettingsError
+from ..errors import MeshError, SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
 from ..geometry import FittedCurvature
@@ -27,7 +27,7 @@ from .mesh_creases import MeshCreases
 from .sizes import SizeField
 from .surface import DesignSurface, components_of
 from .surface_curvature import smooth_absolute_curvature
-from .verification import Shape, shape_of
+from .verification import Shape, shape_of, verify_corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ class Pieces:
 
     Attributes:
         positions: (V, 3).
-        faces: vertices counterclockwise.
+        faces: vertices counterclockwise; of lattices with rows triangles.
         rows: edges with the second coordinate constant, the smaller vertex first.
         creases: edges along creases.
         places: (n, 3) singular points.
@@ -212,13 +212,17 @@ def mesh_components(
 def on_surface(pieces: Pieces, surface: ReadSurface, settings: MeshingSettings) -> Pieces:
     """Pieces with vertices and singular points where the settings want them: on the curved surface or on triangles.
 
-    Those on creases stay.
+    Those on creases stay; all do where a face would have a corner without an angle, and a note says so.
     """
     if not settings.curved:
         return pieces
     flat, on_creases = torch.from_numpy(pieces.positions), pieces.creases.edges.flatten()
     moved = surface.curved(torch.cat([flat, pieces.places]))
     positions, places = moved[: len(flat)].index_copy(0, on_creases, flat[on_creases]), moved[len(flat) :]
+    try:
+        verify_corners(positions.numpy(), pieces.faces)
+    except MeshError as error:
+        return replace(pieces, notes=[*pieces.notes, f"vertices lie on flat triangles: on the curved surface {error}"])
     return replace(pieces, positions=positions.numpy(), places=places)
 
 

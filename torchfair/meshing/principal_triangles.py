@@ -11,10 +11,9 @@ from .._graph import edge_numbers
 from ..principal import PrincipalEdges
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
-from .components import Pieces, on_surface, read_surface, spacing_of
+from .components import on_surface, read_surface, spacing_of
 from .counts import mesh_to_count
 from .curvature_sizes import CurvatureSizes, curvature_sizes
-from .cut_cells import cut_cells
 from .lattice import triangle_lattice
 from .report import measure
 from .row_distances import row_distance, row_sizes, rows_across
@@ -81,11 +80,10 @@ def principal_triangles(
         fields=[of.turned for of in surface.fields] if across else surface.fields,
         sizing=sizing if chosen.adaptive else None,
     )
-    pieces, size = mesh_to_count(laid, lattices, size, chosen, count, _triangles)
-    triangles = cut_cells(pieces.positions, pieces.faces, pieces.rows)
+    pieces, size = mesh_to_count(laid, lattices, size, chosen, count, lambda made: len(made.faces))
     pieces = on_surface(pieces, surface, chosen)
     positions = torch.from_numpy(pieces.positions)
-    made = verified_topology(triangles, len(positions), surface.shape)
+    made = verified_topology(pieces.faces, len(positions), surface.shape)
     principal = PrincipalEdges(made, _mask(made, pieces.rows))
     followed = principal.mask[: made.num_interior_edges]
     report = measure(positions, made, surface, size, pieces.indices, pieces.creases, followed)
@@ -101,10 +99,6 @@ def principal_triangles(
         {**report, "row_distance": ratio, **(pieces.sizes.report(size) if pieces.sizes else {})},
         [*surface.notes, *pieces.notes],
     )
-
-
-def _triangles(pieces: Pieces) -> int:
-    return sum(len(face) - 2 for face in pieces.faces)
 
 
 def _mask(topology: Topology, rows: set[tuple[int, int]]) -> Tensor:

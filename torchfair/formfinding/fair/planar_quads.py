@@ -13,6 +13,7 @@ from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level
 from .panels import PLANAR_PROMISE
+from .problem import KEEP_LIMIT
 from .recipe import minimise_normal_variation
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def planar_quads(
         elif other[0].stopped:
             job = _stopped_like(other[0], job)
     solve = f"{job.steps} steps towards planar polygons: {job.message}"
-    said = [*mesh.notes, *job.notes, *_turned(report), solve]
+    said = [*mesh.notes, *map(_in_counts, job.notes), *_turned(report), solve]
     return replace(mesh, vertices=job.vertices, report=report, notes=said), job
 
 
@@ -102,6 +103,12 @@ def _stopped_like(stopped: JobResult[Level], job: JobResult[Level]) -> JobResult
     *levels, last = job.levels
     end = replace(last.runs[-1], status=stopped.projection.status, message=stopped.message)
     return replace(job, levels=[*levels, replace(last, runs=[*last.runs[:-1], end])], stopped=True)
+
+
+def _in_counts(note: str) -> str:
+    """A note of a job with what a mesh can be asked for in place of its settings, which are always the same."""
+    said = note.removesuffix(KEEP_LIMIT)
+    return note if said == note else f"{said}. Ask for more faces, which are more nearly planar before"
 
 
 def _turn(report: Mapping[str, Any]) -> float:

@@ -32,6 +32,9 @@ _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8
 _MOST_STAGES = 20
 
+KEEP_LIMIT = ": planar_distance 0 to keep that"
+"""How a note ends that says that planar faces lie beyond the distance limit: what settings can do."""
+
 
 class FairProblem:
     """Everything guided projection needs to lower E of one normalised mesh.
@@ -222,7 +225,7 @@ class FairProblem:
         farthest = float(distances[distances > limits].max()) / self.input_edge
         self.notes.append(
             f"planar faces take the mesh {farthest:.3g} mean edge lengths from the reference surface, beyond the "
-            "distance limit: planar_distance 0 to keep that"
+            f"distance limit{KEEP_LIMIT}"
         )
 
     def blocks(self, vertices: Tensor) -> dict[str, Tensor]:
