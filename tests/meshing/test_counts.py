@@ -123,3 +123,22 @@ def test_spacings_that_failed_are_not_tried_again(monkeypatch: pytest.MonkeyPatc
     found, asked = corrected(monkeypatch, 100, lambda at: 85 if at > 0.99 else (86 if at > 0.93 else None))
     assert found == 86
     assert [spacing for spacing, _ in asked] == pytest.approx([0.85**0.5, 0.85**0.25])
+
+
+@pytest.mark.parametrize(("fine", "found"), [(110, 110), (130, 60)])
+def test_where_no_spacing_comes_near_the_count_finer_triangles_are_tried(
+    monkeypatch: pytest.MonkeyPatch, fine: int, found: int
+) -> None:
+    """Turned boxes had 60 of 100 triangles with all spacings on the same triangles; finer ones count if they help."""
+    resolutions: list[float] = []
+
+    def made(_surface: Any, _lattices: Any, _spacing: float, _settings: Any, again: list[Again] | None = None) -> Any:
+        resolutions.extend([] if again is None else [again[0].resolution])
+        is_fine = again is not None and again[0].resolution == 0.5
+        return SimpleNamespace(faces=fine if is_fine else 60, notes=[], plans=[0], creases=SimpleNamespace(length=0.0))
+
+    monkeypatch.setattr(counts, "mesh_components", made)
+    monkeypatch.setattr(counts, "_told", lambda pieces, *_: pieces)
+    pieces, _ = mesh_to_count(cast(Any, None), [], 1.0, MeshingSettings(), 100, lambda of: cast(Any, of).faces)
+    assert cast(Any, pieces).faces == found
+    assert resolutions.count(0.5) >= 1
