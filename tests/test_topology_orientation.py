@@ -28,6 +28,22 @@ def test_rings_are_counterclockwise_seen_from_outside(shape: Callable[[], tuple[
         assert ((turning * (vertices[middle] - centre)).sum(-1) > 0).all()
 
 
+@pytest.mark.parametrize("name", SHELF)
+def test_corners_of_rings_are_those_between_neighbours(name: str) -> None:
+    topology = Topology.from_faces(SHELF[name])
+    faces, starts = topology.face_lists(), topology.face_offsets.tolist()
+    for valence, (vertices, rings) in topology.rings_by_valence.items():
+        corners = topology.ring_corners_by_valence[valence]
+        assert corners.shape == rings.shape
+        for vertex, ring, own in zip(vertices.tolist(), rings.tolist(), corners.tolist(), strict=True):
+            for i, corner in enumerate(own):
+                number = int(topology.corner_faces[corner])
+                face, place = faces[number], corner - starts[number]
+                assert face[place] == vertex
+                assert face[(place + 1) % len(face)] == ring[i]
+                assert face[place - 1] == ring[(i + 1) % valence]
+
+
 def test_a_flat_grid_turns_counterclockwise() -> None:
     topology = Topology.from_faces(grid_faces(3, 3))  # rows along x, columns along y, faces up
     assert topology.rings_by_valence[4][0].tolist() == [4]

@@ -180,6 +180,17 @@ class MeshTables(JoinedTables):
             groups[valence] = (vertices, self.ring_vertices[self.ring_offsets[vertices, None] + columns])
         return groups
 
+    @cached_table
+    def ring_corners_by_valence(self) -> dict[int, Tensor]:
+        """``{k: corners (n, k)}`` at the vertices of :attr:`rings_by_valence`: of the faces between i and i + 1."""
+        size = max(self.num_vertices, 1)
+        keys, order = (self.corners * size + self.corners[self.next_corners]).sort()
+        # The face to the left of the edge from the vertex to neighbour i lies between neighbours i and i + 1.
+        return {
+            valence: order[torch.searchsorted(keys, vertices[:, None] * size + ring)]
+            for valence, (vertices, ring) in self.rings_by_valence.items()
+        }
+
     def boundary_loops(self) -> list[Tensor]:
         """Boundary loops as vertex tensors, the surface on the left, each starting at its smallest vertex."""
         return list(torch.split(self.loop_vertices, self.loop_offsets.diff().tolist()))

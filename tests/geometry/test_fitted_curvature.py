@@ -21,8 +21,12 @@ from torchfair.geometry import (
     principal_directions,
     principal_values,
     rings_for_noise,
+    star_normals,
     vertex_areas,
 )
+from torchfair.geometry import _height_fits as fits_module
+from torchfair.geometry import patches as patches_module
+from torchfair.geometry.tangent_basis import tangent_bases
 from torchfair.shapes import (
     Catenoid,
     Cylinder,
@@ -201,6 +205,53 @@ def test_confidence_is_zero_where_nothing_is_left_to_tell_the_error_by(faces: li
     fit = fitted_curvature(places, topology)
     assert float(fit.traceless.abs().max()) > 0.01
     assert float(fit.confidence.max()) == 0.0
+
+
+def test_fewer_members_than_terms_cost_no_digits() -> None:
+    ball = icosphere(0)  # six members of each patch count, of fifteen terms
+    fit = fitted_curvature(ball.vertices, ball.topology, rings=2)
+    torch.testing.assert_close(fit.normals, ball.vertices, rtol=0, atol=1e-11)
+    assert float(fit.traceless.norm(dim=(-2, -1)).max()) < 1e-10
+
+
+@pytest.mark.parametrize("rings", [2, 4])
+def test_what_is_kept_between_both_fits_changes_nothing(rings: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = irregular_triangles(Torus(), 300)
+    fits = []
+    monkeypatch.setattr(patches_module, "_PAIRS", 500)  # many groups
+    for most in (0, 20_000, 1 << 27):
+        monkeypatch.setattr(fits_module, "_KEPT", most)
+        fits.append(fitted_curvature(mesh.vertices, mesh.topology, rings=rings))
+    for fit in fits[1:]:
+        assert torch.equal(fit.operators, fits[0].operators)
+        assert torch.equal(fit.doubts, fits[0].doubts)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.02])
+def test_rows_make_the_same_fit_as_least_squares_of_each_patch(level: float) -> None:
+    mesh = irregular_triangles(Torus(), 300)
+    noise = torch.randn(mesh.vertices.shape, generator=torch.Generator().manual_seed(3), dtype=DOUBLE)
+    vertices, patches = mesh.vertices + level * noise, Patches(mesh.topology, 3)
+    normals = star_normals(vertices, mesh.topology)
+    found = fits_module.fitted_normals(vertices, normals, patches)
+    members = {
+        int(v): row[there]
+        for group in patches.groups
+        for v, row, there in zip(group.centres, group.members, group.present, strict=True)
+    }
+    for v in range(0, len(vertices), 17):
+        around = members[v]
+        apart = vertices[around] - vertices[v]
+        weights = (normals[around] @ normals[v]).clamp_min(0).square()
+        distance = apart.square().sum(-1)
+        weights = weights * torch.exp(-2 * distance / ((distance * weights).sum() / weights.sum()))
+        first, second = tangent_bases(normals[v])
+        x, y, z = apart @ first, apart @ second, apart @ normals[v]
+        terms = torch.stack([torch.ones_like(x), x, y, x * x, x * y, y * y], dim=-1)
+        root = weights.sqrt()[:, None]
+        slope = torch.linalg.lstsq(root * terms, root * z[:, None], driver="gelsd").solution[1:3, 0]
+        normal = normals[v] - slope[0] * first - slope[1] * second
+        torch.testing.assert_close(found[v], normal / normal.norm(), rtol=0, atol=1e-9)
 
 
 def test_confidence_is_zero_where_there_is_no_direction() -> None:

@@ -12,7 +12,8 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair._names import Names
 from torchfair.geometry import edge_lengths
-from torchfair.measuring import diagnose_mesh, layout_advice, pattern_words, star_remedy
+from torchfair.measuring import diagnose_mesh, layout_advice, pattern_words, star_remedies, star_remedy
+from torchfair.measuring import remedies as remedies_module
 from torchfair.shapes import Catenoid, Hyperboloid, Torus, icosphere, principal_triangles, rotated_lattice
 
 Mesh = tuple[Tensor, Topology]
@@ -48,6 +49,19 @@ def test_a_slide_that_is_proposed_leaves_as_many_bad_stars_as_it_says() -> None:
         assert bad_around(slid, topology, row["vertex"]) == remedy.bad_after < remedy.bad_before
         seen += 1
     assert seen >= 2
+
+
+def test_several_vertices_are_told_what_each_is_told_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    vertices, topology = lattice()
+    generator = torch.Generator().manual_seed(2)
+    noisy = vertices + 0.02 * torch.randn(vertices.shape, generator=generator, dtype=DOUBLE)
+    chosen = [row["vertex"] for row in diagnose_mesh(noisy, topology).worst_vertices(9)]
+    alone = [star_remedy(noisy, topology, vertex) for vertex in chosen]
+    assert len({None if remedy is None else remedy.words for remedy in alone}) > 3
+    assert star_remedies(noisy, topology, chosen) == alone
+    monkeypatch.setattr(remedies_module, "_TOGETHER", 4)
+    assert star_remedies(noisy, topology, chosen) == alone
+    assert star_remedies(noisy, topology, []) == []
 
 
 @pytest.mark.parametrize("first", [0, 1])

@@ -19,7 +19,16 @@ from torchfair.principal import (
     principal_edges_from_directions,
     principal_edges_from_seed,
 )
-from torchfair.shapes import Catenoid, Cylinder, PrincipalHelicoid, Torus, icosphere, principal_triangles
+from torchfair.principal import directions as directions_module
+from torchfair.shapes import (
+    Catenoid,
+    Cylinder,
+    PrincipalHelicoid,
+    Torus,
+    icosphere,
+    irregular_triangles,
+    principal_triangles,
+)
 from torchfair.subdivision import loop
 
 every_lattice = pytest.mark.parametrize("name", LATTICES)
@@ -212,6 +221,16 @@ def test_numbers_of_vertices_and_faces_do_not_matter() -> None:
     vertices[new] = mesh.vertices
     found = principal_edges_from_directions(vertices, topology)
     assert torch.equal(found.edges.mask[edge_numbers(topology, new[mesh.topology.edges])], mesh.edges_along("u"))
+
+
+def test_edges_are_looked_at_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = irregular_triangles(Torus(), 300)
+    whole = principal_edges_from_directions(mesh.vertices, mesh.topology, allow_exceptions=True)
+    monkeypatch.setattr(directions_module, "_EDGES", 7)
+    pieces = principal_edges_from_directions(mesh.vertices, mesh.topology, allow_exceptions=True)
+    assert torch.equal(whole.edges.mask, pieces.edges.mask)
+    assert torch.equal(whole.chosen, pieces.chosen)
+    assert whole.misalignment == pytest.approx(pieces.misalignment, rel=1e-12)
 
 
 def test_directions_are_only_needed_somewhere() -> None:

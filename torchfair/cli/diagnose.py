@@ -215,12 +215,12 @@ def _remedy_words(remedy: dict[str, Any] | None) -> str:
 
 def _explain(worst: list[dict[str, Any]], mesh: PolygonMesh) -> None:
     """Adds to every vertex where it is, its number in the file, its pattern in words, and what it needs."""
-    from ..measuring import pattern_words, star_remedy
+    from ..measuring import pattern_words, star_remedies
 
     vertices = mesh.vertices.double()
-    for row in worst:
+    remedies = star_remedies(vertices, mesh.topology, [row["vertex"] for row in worst], names=mesh.names)
+    for row, remedy in zip(worst, remedies, strict=True):
         vertex = row["vertex"]
-        remedy = star_remedy(vertices, mesh.topology, vertex, names=mesh.names)
         row["position"] = vertices[vertex].tolist()
         row["number_in_file"] = int(mesh.names.vertex(vertex))
         row["pattern_words"] = pattern_words(row["ordinary_pattern"], row["valence"])

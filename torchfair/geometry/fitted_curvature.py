@@ -207,7 +207,7 @@ def _relative_doubt(fit: FittedCurvature) -> float:
 def _forms(heights: Heights) -> tuple[Tensor, Tensor, Tensor]:
     """Normals, operators and their doubts from the derivatives of the heights at the centre."""
     first, second, normal = heights.frames.unbind(-2)
-    _, fx, fy, xx, xy, yy = heights.coefficients[..., :6].unbind(-1)
+    _, fx, fy, xx, xy, yy = heights.coefficients.unbind(-1)
     slope = torch.stack([fx, fy], dim=-1)
     stretch = (1.0 + slope.square().sum(-1)).sqrt()[..., None]
     normals = turned_normals(heights.frames, slope)
@@ -220,8 +220,6 @@ def _forms(heights: Heights) -> tuple[Tensor, Tensor, Tensor]:
     tangents = root @ tangents
     hessian = torch.stack([torch.stack([2 * xx, xy], dim=-1), torch.stack([xy, 2 * yy], dim=-1)], dim=-2)
     plane = -(root @ hessian @ root) / (stretch * heights.scale[..., None, None])
-    covariance = heights.covariance
-    half_difference = covariance[..., 3, 3] + covariance[..., 5, 5] - 2 * covariance[..., 3, 5]
-    doubts = (half_difference + covariance[..., 4, 4]).clamp_min(0.0)
+    doubts = heights.uncertainty.clamp_min(0.0)
     doubts = torch.where(doubts > 0.0, torch.where(doubts > 0.0, doubts, 1.0).sqrt(), 0.0) / 2**0.5 / heights.scale
     return normals, tangents.mT @ plane @ tangents, doubts

@@ -14,6 +14,7 @@ from .measurements import measure_mesh as measure_mesh
 from .pattern_words import pattern_words as pattern_words
 from .remedies import Remedy as Remedy
 from .remedies import layout_advice as layout_advice
+from .remedies import star_remedies as star_remedies
 from .remedies import star_remedy as star_remedy
 from .stationarity import Stationarity as Stationarity
 from .stationarity import measure_stationarity as measure_stationarity

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
-import torch
 from torch import Tensor
 
-from .._graph import edge_numbers
 from .._names import FROM_ZERO, Names
 from .._threads import threads_for
 from ..errors import MeshError, TorchfairError
-from ..geometry import edge_lengths, star_normals
-from ..geometry.tangent_basis import tangent_bases
-from ..stars import classify_stars, pyramid_self_intersections
 from ..topology import Topology
+from ._star_patches import Patch, bad_stars, surroundings
 from .diagnosis import Diagnosis
 
-_SLIDES = (0.1, 0.2, 0.35)  # mean edge lengths of the star that a vertex is tried to be slid by
-_WAYS = 12
+_TOGETHER = 50  # vertices whose trials are judged at once
 _MANY = 0.2  # share of negatively curved stars that are bad from which on the layout is to blame
 _ALIGNED = 0.2  # radians off principal directions up to which a family of edges is worth keeping
 
@@ -60,92 +57,40 @@ def star_remedy(vertices: Tensor, topology: Topology, vertex: int, *, names: Nam
     Returns:
         None where nothing of that leaves fewer bad stars.
     """
-    try:
-        patch = _Patch(vertices, topology, vertex, names)
-    except MeshError:  # faces around it that touch in single vertices are no mesh
-        return None
-    trials = [_Trial("", patch.vertices, patch.faces), *patch.slides(), *patch.flips()]
+    return star_remedies(vertices, topology, [vertex], names=names)[0]
+
+
+def star_remedies(
+    vertices: Tensor, topology: Topology, chosen: Sequence[int], *, names: Names = FROM_ZERO
+) -> list[Remedy | None]:
+    """What :func:`star_remedy` says of each of some vertices, by itself, in a fraction of the time.
+
+    Args:
+        vertices: (V, 3) float64.
+        topology: any polygons.
+        chosen: inner vertices.
+        names: what vertices are called in words, such as ``names`` of a mesh that was read.
+    """
+    remedies: list[Remedy | None] = []
     with threads_for(0, vertices.device):
-        before, *after = patch.bad(trials)
-    least = min(after, default=before)
-    if least >= before:
-        return None
-    return Remedy(trials[1 + after.index(least)].words, before, least)
+        for start in range(0, len(chosen), _TOGETHER):
+            remedies += _remedies(vertices, topology, chosen[start : start + _TOGETHER], names)
+    return remedies
 
 
-class _Trial(NamedTuple):
-    """Something that can be done, and the patch after it."""
-
-    words: str
-    vertices: Tensor
-    faces: list[list[int]]
-
-
-class _Patch:
-    """The faces around a vertex and its neighbours, which hold all stars that change."""
-
-    def __init__(self, vertices: Tensor, topology: Topology, vertex: int, names: Names) -> None:
-        self._names = names
-        start, stop = topology.ring_offsets[vertex : vertex + 2].tolist()
-        self._judged = torch.cat([torch.tensor([vertex]), topology.ring_vertices[start:stop]])
-        near = torch.isin(topology.corners, self._judged)
-        faces = torch.unique(topology.corner_faces[near]).tolist()
-        offsets = topology.face_offsets
-        chosen = [topology.corners[offsets[face] : offsets[face + 1]].tolist() for face in faces]
-        self.numbers = torch.tensor(sorted({v for face in chosen for v in face}))
-        place = {v: i for i, v in enumerate(self.numbers.tolist())}
-        self.faces = [[place[v] for v in face] for face in chosen]
-        self.topology = Topology.from_faces(self.faces, len(place))
-        self.vertices, self._vertex = vertices[self.numbers], place[vertex]
-        self._own = torch.isin(self.numbers, self._judged)
-
-    def bad(self, trials: list[_Trial]) -> list[int]:
-        """Bad stars among those judged after each trial; all are judged at once, beside each other."""
-        count = len(self.numbers)
-        faces = [[v + count * i for v in face] for i, trial in enumerate(trials) for face in trial.faces]
-        topology = Topology.from_faces(faces, count * len(trials))
-        vertices = torch.cat([trial.vertices for trial in trials])
-        classes = classify_stars(vertices, topology)
-        wrong = classes.bad | (pyramid_self_intersections(vertices, topology) > 0)
-        numbers: list[int] = (wrong.view(-1, count) & self._own).sum(1).tolist()
-        return numbers
-
-    def slides(self) -> list[_Trial]:
-        """Of the vertex, along its tangent plane, the shortest first."""
-        lengths, ends = edge_lengths(self.vertices, self.topology), self.topology.edges
-        edge = float(lengths[(ends == self._vertex).any(1)].mean())
-        first, second = tangent_bases(star_normals(self.vertices, self.topology))[self._vertex]
-        made = []
-        for share in _SLIDES:
-            for way in range(_WAYS):
-                angle = math.tau * way / _WAYS
-                slid = self.vertices.clone()
-                slid[self._vertex] += share * edge * (math.cos(angle) * first + math.sin(angle) * second)
-                x, y, z = slid[self._vertex].tolist()
-                words = f"slide it by {share:g} of its edges, to {x:.6g} {y:.6g} {z:.6g}"
-                made.append(_Trial(words, slid, self.faces))
-        return made
-
-    def flips(self) -> list[_Trial]:
-        """Of edges between two triangles, one of which has the vertex."""
-        made = []
-        corners = [set(face) for face in self.faces]
-        for number, (left, right) in enumerate(self.topology.interior_edge_faces.tolist()):
-            v, w = self.topology.edges[number].tolist()
-            if (
-                len(corners[left]) != 3
-                or len(corners[right]) != 3
-                or self._vertex not in corners[left] | corners[right]
-            ):
-                continue
-            a, b = (corners[left] - {v, w}).pop(), (corners[right] - {v, w}).pop()
-            if int(edge_numbers(self.topology, torch.tensor([[a, b]]))[0]) >= 0:
-                continue
-            faces = [face for i, face in enumerate(self.faces) if i not in (left, right)]
-            names = [self._names.vertex(int(self.numbers[i])) for i in (v, w, a, b)]
-            words = "flip the edge {} {} to {} {}".format(*names)
-            made.append(_Trial(words, self.vertices, [*faces, [v, b, a], [b, w, a]]))
-        return made
+def _remedies(vertices: Tensor, topology: Topology, chosen: Sequence[int], names: Names) -> list[Remedy | None]:
+    patches: dict[int, Patch] = {}
+    for number, near in enumerate(surroundings(topology, chosen)):
+        with suppress(MeshError):  # faces around it that touch in single vertices are no mesh
+            patches[number] = Patch(vertices, near, chosen[number], names)
+    trials = [patch.trials() for patch in patches.values()]
+    found: list[Remedy | None] = [None] * len(chosen)
+    for number, own, bad in zip(patches, trials, bad_stars(list(patches.values()), trials), strict=True):
+        before, *after = bad
+        least = min(after, default=before)
+        if least < before:
+            found[number] = Remedy(own[1 + after.index(least)].words, before, least)
+    return found
 
 
 def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis, *, names: Names = FROM_ZERO) -> list[str]:

@@ -12,7 +12,7 @@ from torch import Tensor
 from .._names import PlacedError
 from ..errors import ShapeError, TorchfairError
 from ..geometry import fitted_curvature, star_normals
-from ..geometry._ops import cross, dot
+from ..geometry._ops import cross, gather
 from ..topology import Topology
 from ._families import Differences, Ints, differences, face_components, mark, seams, spread
 from .labels import require_no_seams
@@ -23,6 +23,7 @@ Floats = npt.NDArray[np.float64]
 LARGE_MISALIGNMENT = 0.4
 """Radians from which on edges cannot be said to follow directions: crosses at random are pi/8 = 0.39 off."""
 
+_EDGES = 1 << 14  # at once: what is made of them stays near the cache
 _LEAST = 1e-6  # confidence of computed directions: also on spheres and planes there is a choice
 
 
@@ -171,25 +172,42 @@ def _crosses(vertices: Tensor, topology: Topology, directions: Tensor | None, co
 
 def _side_angles(vertices: Tensor, topology: Topology, crosses: _Crosses, rule: Differences) -> tuple[Floats, Ints]:
     """(F, 3) angle of each side with the nearer mean of directions at its ends, NaN where there is none; and which."""
-    directions, ends = crosses.directions.transpose(0, 1), topology.edges
     vertices = vertices.detach().to(torch.float64)
-    along = (vertices[ends[:, 1]] - vertices[ends[:, 0]])[:, None]
-    normals = star_normals(vertices, topology)[ends]
-    at_ends = directions[:, ends]  # (fields, E, 2, 3)
-    # Directions have no sign, so angles are doubled before they are averaged. On a curve that bends in the surface
-    # the angles at both ends have opposite signs.
-    flat = torch.complex(dot(at_ends, along), dot(cross(at_ends, along.expand_as(at_ends)), normals))
-    doubled = torch.nan_to_num((flat / flat.abs()) ** 2) * crosses.confidence[ends]
-    first, second = doubled.unbind(2)  # (fields, E)
-    # Between the ends d1 and d2 may change places: each direction goes with the one that is nearest to it.
-    likeness = (first[:, None] * second[None].conj()).real + 1e-12 * torch.eye(len(first)).to(first.real)[..., None]
-    partner = likeness.argmax(1)
-    mean = first + second.gather(0, partner)
-    angle = torch.where(mean.abs() > 1e-9, mean.angle().abs() / 2, torch.nan)
-    nearest, which = torch.where(angle.isnan(), torch.inf, angle).min(0)
+    directions, normals = crosses.directions, star_normals(vertices, topology)
+    # The angle at an end is told by the products of the edge with a direction and with that turned in the surface.
+    both = torch.cat([directions, cross(normals[:, None].expand_as(directions), directions)], 1)
+    parts = [_edge_angles(vertices, both, crosses.confidence, ends) for ends in topology.edges.split(_EDGES)]
+    nearest, which = (torch.cat(found) for found in zip(*parts, strict=True))
     values: Floats = torch.where(nearest.isinf(), torch.nan, nearest).cpu().numpy()
     fields: Ints = which.cpu().numpy()
     return values[rule.side_edges], fields[rule.side_edges]
+
+
+def _edge_angles(vertices: Tensor, both: Tensor, confidence: Tensor, ends: Tensor) -> tuple[Tensor, Tensor]:
+    """(n,) angle of edges with the nearer mean of directions at their ends, infinite where there is none; and which.
+
+    Args:
+        vertices: (V, 3).
+        both: (V, 2 * fields, 3) directions, and the same turned by a right angle about the vertex normals.
+        confidence: (V,).
+        ends: (n, 2) vertices.
+    """
+    along = gather(vertices, ends[:, 1]) - gather(vertices, ends[:, 0])
+    fields = both.shape[1] // 2
+    at_ends = gather(both.flatten(1), ends).view(*ends.shape, 2 * fields, 3)
+    flat = (at_ends @ along[:, None, :, None]).squeeze(-1)
+    flat = torch.complex(flat[..., :fields], flat[..., fields:])  # (n, 2, fields)
+    # Directions have no sign, so angles are doubled before they are averaged. On a curve that bends in the surface
+    # the angles at both ends have opposite signs.
+    turned = flat / flat.abs()
+    doubled = torch.nan_to_num(turned * turned) * confidence[ends][..., None]
+    first, second = doubled.permute(1, 2, 0)  # (fields, n)
+    # Between the ends d1 and d2 may change places: each direction goes with the one that is nearest to it.
+    likeness = (first[:, None] * second[None].conj()).real + 1e-12 * torch.eye(fields).to(first.real)[..., None]
+    mean = first + second.gather(0, likeness.argmax(1))
+    angle = torch.where(mean.abs() > 1e-9, mean.angle().abs() / 2, torch.inf)
+    nearest, which = angle.min(0)
+    return nearest, which
 
 
 def _face_means(crosses: _Crosses, topology: Topology) -> Floats:

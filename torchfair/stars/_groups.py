@@ -31,17 +31,10 @@ class StarGroup(NamedTuple):
     corners: Tensor
 
 
-@torch.inference_mode(False)
 def star_groups(topology: Topology) -> list[StarGroup]:
     """All inner vertices, grouped by valence. Boundary vertices and isolated ones are in no group."""
-    size = max(topology.num_vertices, 1)
-    keys = topology.corners * size + topology.corners[topology.next_corners]
-    keys, order = keys.sort()
-    groups = []
-    for centres, ring in topology.rings_by_valence.values():
-        # The face to the left of the edge from the centre to neighbour i lies between neighbours i and i + 1.
-        groups.append(StarGroup(centres, ring, order[torch.searchsorted(keys, centres[:, None] * size + ring)]))
-    return groups
+    corners = topology.ring_corners_by_valence
+    return [StarGroup(*group, corners[valence]) for valence, group in topology.rings_by_valence.items()]
 
 
 class Arms(NamedTuple):
