@@ -171,7 +171,8 @@ def _low_rows(root: Tensor) -> Tensor:
     """(..., 6, p) rows of the inverse for ``1, x, y, x^2, x y, y^2`` in turn, by the Cholesky factor of the matrix."""
     last = torch.eye(root.shape[-1])[-_NEEDED:].to(root)
     rows = torch.linalg.solve_triangular(root, last, upper=False, left=False)
-    return rows[..., -_NEEDED:].flip(-1).mT @ rows
+    low: Tensor = rows[..., -_NEEDED:].flip(-1).mT @ rows
+    return low
 
 
 def _variance(left: Tensor, square: Tensor, total: Tensor, used: Tensor) -> Tensor:

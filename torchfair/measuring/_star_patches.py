@@ -130,5 +130,5 @@ def bad_stars(patches: Sequence[Patch], trials: Sequence[Sequence[Trial]]) -> li
         return [[] for _ in patches]
     topology, positions = Topology.from_faces(faces, count), torch.cat(vertices)
     wrong = classify_stars(positions, topology).bad | (pyramid_self_intersections(positions, topology) > 0)
-    numbers = iter([int(part.sum()) for part in (wrong & torch.cat(judged)).split(sizes)])
+    numbers = iter([int(part.sum()) for part in torch.split(wrong & torch.cat(judged), sizes)])
     return [[next(numbers) for _ in tried] for tried in trials]

@@ -176,7 +176,7 @@ def _side_angles(vertices: Tensor, topology: Topology, crosses: _Crosses, rule: 
     directions, normals = crosses.directions, star_normals(vertices, topology)
     # The angle at an end is told by the products of the edge with a direction and with that turned in the surface.
     both = torch.cat([directions, cross(normals[:, None].expand_as(directions), directions)], 1)
-    parts = [_edge_angles(vertices, both, crosses.confidence, ends) for ends in topology.edges.split(_EDGES)]
+    parts = [_edge_angles(vertices, both, crosses.confidence, ends) for ends in torch.split(topology.edges, _EDGES)]
     nearest, which = (torch.cat(found) for found in zip(*parts, strict=True))
     values: Floats = torch.where(nearest.isinf(), torch.nan, nearest).cpu().numpy()
     fields: Ints = which.cpu().numpy()
