@@ -190,12 +190,16 @@ class Trials:
         return self._of_large(self._evaluate(change), change, whole)
 
     def _of_large(self, trial: Evaluation, change: Tensor, whole: Tensor) -> _Tried | None:
+        """What it leads to; the whole step, shortened evenly, where it is not finite or, as the first, not downhill."""
         promised = self._promised if change is whole else self._proposal.system.predicted_fall(change).tolist()
         merits = trial.merits.tolist()
         if not math.isfinite(merits[0]):
             return self._shorter(whole)
-        tried = _Tried(trial, change, range(1), merits, promised)
-        return tried if promised[0] > 0.0 else self._shorter(whole) or tried
+        if promised[0] > 0.0:
+            return _Tried(trial, change, range(1), merits, promised)
+        # Steps longer than the model's are never downhill in the model: they count by what the step was to gain.
+        tried = _Tried(trial, change, range(1), merits, self._promised)
+        return tried if self.taken[0] else self._shorter(whole) or tried
 
     def _shorter(self, change: Tensor) -> _Tried | None:
         """What a step leads to that is shortened as a whole until all members are finite; None if none is.

@@ -92,7 +92,8 @@ class FairSettings:
             0.05 it falls with that mean: else all edges would be flat. A smaller one leads to a smaller E, but gathers
             what bends in fewer edges, so that reflections break more visibly.
         continuation: Factors of ``smoothing`` in stages before the last, and of the weight of fairness up to the one
-            given, falling; empty for the last stage alone.
+            given, falling; empty for the last stage alone. From 50 000 vertices on those stages smooth by at most a
+            quarter of the mean ``l l*``.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables too.
         constraint_weight: Weight of half the squared constraints that define the auxiliary variables.
         projection: Iterations, tolerances, damping and linear solver.
