@@ -77,7 +77,7 @@ def test_the_end_is_that_of_a_small_problem() -> None:
     few = {"x": blocks["x"][:FEW]}
     small = GuidedProjection(few, small_terms).solve(few, settings=ProjectionSettings(merit_tolerance=1e-14))
     torch.testing.assert_close(large.blocks["x"][:FEW], small.blocks["x"], rtol=0, atol=1e-4)
-    assert not any(record.gain < 0.0 for record in large.history[1:])
+    assert all(record.gain > 0.5 for record in large.history[1:5])  # until all but the walled ones are at rest
 
 
 def test_dear_data_are_found_for_states_that_are_not_spoilt_otherwise() -> None:
@@ -100,47 +100,59 @@ def test_dear_data_are_found_for_states_that_are_not_spoilt_otherwise() -> None:
 
 
 @pytest.mark.parametrize(("share", "few"), [(0.04, True), (0.06, False)])
-def test_where_many_elements_are_dear_the_whole_step_is_too_long(share: float, few: bool) -> None:
+def test_where_many_barriers_are_dear_the_whole_step_is_too_long(share: float, few: bool) -> None:
     count = round(share * MANY)
-    blocks, terms = targets_with_walls(torch.full((count,), 1e9, dtype=torch.float64))
+    blocks, terms = targets_with_walls(torch.full((count,), 0.5, dtype=torch.float64))
     problem = GuidedProjection(blocks, terms)
     state = init(problem, blocks)
-    proposal = proposed(problem, state)
-    attempts = Attempts(state.evaluation, proposal)
+    attempts = Attempts(state.evaluation, proposed(problem, state))
     far = blocks["x"].clone()
-    far[:count] = -1e6  # each costs far more than all others gain
+    far[:count] = 0.5 - 1e-6  # each costs far more than all others gain
     found = attempts.evaluated({"x": far})
     assert isinstance(found, Spoilt if few else Evaluation)
     if isinstance(found, Spoilt):
-        assert found.terms == [0]
+        assert found.terms == [1]
         assert int(found.unknowns.sum()) == count
         assert bool(found.unknowns[:count].all())
     else:
         torch.testing.assert_close(found.merits, problem.structure.evaluate({"x": far}).merits, rtol=0, atol=0)
 
 
-def test_what_the_model_says_that_an_element_costs_is_not_dear() -> None:
-    """One spring against many: the model knows that it is stretched, and the step is taken as it is."""
+def test_what_is_no_barrier_may_cost_what_it_does() -> None:
+    """Where few elements hold most of the merit, they are what has to move."""
+    blocks, terms = targets_with_walls(torch.full((FEW,), 1e9, dtype=torch.float64))
+    problem = GuidedProjection(blocks, terms)
+    state = init(problem, blocks)
+    attempts = Attempts(state.evaluation, proposed(problem, state))
+    far = blocks["x"].clone()
+    far[:FEW] = -1e6
+    assert isinstance(attempts.evaluated({"x": far}), Evaluation)
 
-    def spring(x: Tensor) -> Tensor:
-        return x[0] * (1.0 + 1e-9 * x[0])  # linear but for a trace
+
+def test_what_the_model_says_that_a_barrier_costs_is_not_dear() -> None:
+    """One soft barrier against many pulls: the model knows that it is entered, and the step is taken as it is."""
+
+    def entered(x: Tensor) -> Tensor:
+        return 3.0 * x[0].clamp_min(0.0) * (1.0 + 1e-9 * x[0])
 
     def pull(x: Tensor, target: Tensor) -> Tensor:
         return (x - target)[0] * (1.0 + 1e-9 * x[0])
 
     every, one = torch.arange(MANY)[:, None], torch.zeros(1, 1, dtype=torch.int64)
-    blocks = {"x": torch.zeros(MANY, 1, dtype=torch.float64)}
-    targets = torch.full((MANY, 1), 1e-4, dtype=torch.float64)
+    blocks = {"x": torch.full((MANY, 1), 1e-3, dtype=torch.float64)}
+    targets = torch.full((MANY, 1), 1.1e-3, dtype=torch.float64)
     targets[0] = 10.0
     terms = [
-        ElementTerm("spring", spring, [("x", one)], weight=1.0),
+        ElementTerm("entered", entered, [("x", one)], silent=True),
         ElementTerm("pull", pull, [("x", every)], data=(targets,)),
     ]
     problem = GuidedProjection(blocks, terms)
     state = init(problem, blocks)
     proposal = proposed(problem, state)
-    assert float(proposal.system.rises(0, proposal.change)[0]) > 0.3 * float(proposal.predicted)
-    found = Attempts(state.evaluation, proposal).evaluated(problem.layout.unflatten(proposal.change))
+    assert float(proposal.system.rises(0, proposal.change)[0]) > 0.05 * float(proposal.predicted)
+    found = Attempts(state.evaluation, proposal).evaluated(
+        problem.layout.unflatten(state.blocks["x"][:, 0] + proposal.change)
+    )
     assert isinstance(found, Evaluation)
 
 

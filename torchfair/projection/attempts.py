@@ -1,7 +1,8 @@
-"""States of large problems that are tried: a few elements among very many do not decide on the step of all.
+"""States of large problems that are tried: a few barriers among very many do not decide on the step of all.
 
-Where a step takes elements out of their domain, or so near its border that each of them alone costs a visible part of
-what all others gain, their unknowns go less far. Of states that are not taken, no more is computed than shows that.
+Where a step takes elements out of their domain, or barriers so near their bound that each of them alone costs a visible
+part of what all others gain, their unknowns go less far. Other elements may cost what they do: where few of them hold
+most of the merit, they are what has to move. Of states that are not taken, no more is computed than shows that.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class Spoilt(NamedTuple):
 
 
 class Attempts:
-    """Looks for elements that spoil a state: their share of the merit is not finite, or has risen dearly.
+    """Looks for elements that spoil a state: their share of the merit is not finite, or a barrier's has risen dearly.
 
     Args:
         start: Where the step starts, of a problem of one member.
@@ -68,11 +69,12 @@ class Attempts:
         return self._spoilt(terms, [seen(self._structure.compiled[n].term, state).contributions for n in terms])
 
     def _spoilt(self, numbers: Sequence[int], contributions: Sequence[Tensor]) -> Spoilt | None:
-        """Elements that have risen dearly count only if they are few."""
+        """Barriers, elements of silent terms, that have risen dearly count only if they are few."""
         outside, dear = Spoilt([], self._nothing()), Spoilt([], self._nothing())
         for number, shares in zip(numbers, contributions, strict=True):
             self._note(outside, number, ~torch.isfinite(shares))
-            self._note(dear, number, self._has_risen(number, shares))
+            if self._structure.compiled[number].term.silent:
+                self._note(dear, number, self._has_risen(number, shares))
         if dear.terms and float(dear.unknowns.double().mean()) <= _FEW:
             terms = sorted({*outside.terms, *dear.terms})
             return Spoilt(terms, outside.unknowns | dear.unknowns)
