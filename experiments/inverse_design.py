@@ -192,7 +192,7 @@ def draw_points(meshes: dict[str, Tensor], design: Design, width: int, results: 
         axes = sheet.axes(left, CAPTION, size[1], size[0])
         axes.set_axis_off()
         picture = mesh.paint(shade_faces(vertices, topology, camera), edges=quiet_edges(mesh))
-        axes.imshow(picture.clamp(0, 1), extent=(0, size[1], size[0], 0), interpolation="none")
+        axes.imshow(picture.clamp(0, 1).numpy(), extent=(0, size[1], size[0], 0), interpolation="none")
         ends = torch.stack([camera.project(places, size)[0] for places in (design.points, feet)])[..., :2]
         axes.plot(*ends.unbind(-1), color=RED, linewidth=points(6))
         axes.plot(*ends[0].T, "o", color=BLUE, markersize=points(13), markeredgecolor="white")

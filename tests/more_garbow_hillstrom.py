@@ -15,8 +15,9 @@ from torchfair.projection import ElementTerm
 
 BARD = [0.14, 0.18, 0.22, 0.25, 0.29, 0.32, 0.35, 0.39, 0.37, 0.58, 0.73, 0.96, 1.34, 2.10, 4.39]
 GAUSSIAN = [0.0009, 0.0044, 0.0175, 0.0540, 0.1295, 0.2420, 0.3521, 0.3989]
-# A valley of weak minima: a narrow bell through two neighbouring data is zero at all others.
+# Valleys of weak minima: a narrow bell through two neighbouring data, or the middle one, is zero at all others.
 NARROW_GAUSSIAN = 2 * sum(y**2 for y in GAUSSIAN[:-1]) + GAUSSIAN[-1] ** 2 - GAUSSIAN[5] ** 2 - GAUSSIAN[6] ** 2
+SINGLE_GAUSSIAN = 2 * sum(y**2 for y in GAUSSIAN[:-1])
 MEYER = [34780, 28610, 23650, 19630, 16370, 13720, 11540, 9744, 8261, 7030, 6005, 5147, 4427, 3820, 3307, 2872]
 KOWALIK_OSBORNE = [
     [4.0, 2.0, 1.0, 0.5, 0.25, 0.167, 0.125, 0.1, 0.0833, 0.0714, 0.0625],
@@ -114,7 +115,7 @@ PROBLEMS = [
         "gaussian",
         of.gaussian,
         [0.4, 1.0, 0.0],
-        [1.127933e-8, NARROW_GAUSSIAN],
+        [1.127933e-8, NARROW_GAUSSIAN, SINGLE_GAUSSIAN],
         data=(steps(-0.5, 15, -7), *table(GAUSSIAN + GAUSSIAN[-2::-1])),
     ),
     problem(

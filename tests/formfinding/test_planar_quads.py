@@ -21,7 +21,7 @@ from torchfair.formfinding import (
     minimise_normal_variation,
     planar_quads,
 )
-from torchfair.meshing import QuadMesh, principal_quads
+from torchfair.meshing import QuadMesh, combing, principal_quads
 from torchfair.projection import Callback, Status
 from torchfair.shapes import PrincipalParaboloid, builtin_mesh, irregular_triangles
 
@@ -182,8 +182,13 @@ def test_panels_at_the_boundary_do_not_grow_to_save_e():
 
 
 @pytest.mark.slow
-def test_planar_faces_that_cost_a_little_of_e_stay_within_the_distance_limit():
-    """A monkey saddle: faces went up to half an edge away, where E was lower."""
+def test_planar_faces_that_cost_a_little_of_e_stay_within_the_distance_limit(monkeypatch):
+    """A monkey saddle: faces went up to half an edge away, where E was lower.
+
+    Its mesh is the one on which they did, whose singular point lies at a vertex of too few triangles: elsewhere
+    planarity costs more E.
+    """
+    monkeypatch.setattr(combing, "with_room", lambda frames, angles, matched, *rest: (angles, matched))
     surface = graph_over_a_square(500, monkey=True)
     mesh = principal_quads(*surface, count=150)
     made, job = planar_quads(mesh, surface)
