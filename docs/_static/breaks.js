@@ -8,7 +8,7 @@ for (const code of document.querySelectorAll("article table code")) {
     node.replaceWith(...parts.flatMap((part, i) => (i ? [document.createElement("wbr"), part] : [part])));
   }
 }
-// Cells of a few numbers are not broken.
+// Cells of a few numbers are not broken, where there are few columns.
 for (const cell of document.querySelectorAll("article td")) {
-  if (/^\d.{0,13}$/.test(cell.textContent.trim())) cell.style.whiteSpace = "nowrap";
+  if (cell.parentElement.children.length <= 6 && /^\d.{0,13}$/.test(cell.textContent.trim())) cell.style.whiteSpace = "nowrap";
 }
