@@ -74,7 +74,7 @@ def _merged(frames: FaceFrames, matched: Ints, charges: Ints, trust: Floats, rad
     singular = np.flatnonzero(charges)
     if len(singular) < 2:
         return matched, touched
-    distance, before = dijkstra(_inner_edges(frames), indices=singular, limit=radius, return_predecessors=True)
+    distance, before = dijkstra(inner_edges(frames), indices=singular, limit=radius, return_predecessors=True)
     near = distance[:, singular]
     rows, columns = np.nonzero(np.triu(np.isfinite(near), 1))
     free = set(singular.tolist())
@@ -100,21 +100,9 @@ def _onto(frames: FaceFrames, matched: Ints, charges: Ints, stay: Bools, radius:
     """Matchings with singular vertices moved onto vertices without an index that stay, the nearest first."""
     touched = np.zeros(len(frames.points), bool)
     singular, free = np.flatnonzero((charges != 0) & ~stay), np.flatnonzero((charges == 0) & stay & ~frames.is_boundary)
-    if not (len(singular) and len(free)):
-        return matched, touched
-    distance, before = dijkstra(_inner_edges(frames), indices=singular, limit=radius, return_predecessors=True)
-    near = distance[:, free]
     steps: list[tuple[int, int, int]] = []
-    taken: set[int] = set()
-    for row, column in np.argwhere(np.isfinite(near))[np.argsort(near[np.isfinite(near)], kind="stable")].tolist():
-        start, goal = int(singular[row]), int(free[column])
-        if not taken.isdisjoint((start, goal)):
-            continue
-        taken |= {start, goal}
-        path = [goal]
-        while path[-1] != start:
-            path.append(int(before[row, path[-1]]))
-        steps += [(a, b, int(charges[start])) for a, b in itertools.pairwise(path[::-1])]
+    for path in nearest_paths(inner_edges(frames), singular, free, radius):
+        steps += [(a, b, int(charges[path[-1]])) for a, b in itertools.pairwise(path[::-1])]
         touched[path] = True
     return carried_charges(frames, matched, steps), touched
 
@@ -127,7 +115,7 @@ def _split(
     One part after the other goes as far as the radius, and to neighbours at least, each as far from those before as it
     can, among vertices inside.
     """
-    touched, graph = np.zeros(len(frames.points), bool), _inner_edges(frames)
+    touched, graph = np.zeros(len(frames.points), bool), inner_edges(frames)
     most = _MOST_POSITIVE[symmetry]
     for vertex in np.flatnonzero(charges > most).tolist():
         reach = max(radius, float(graph[vertex].data.max(initial=0.0)))
@@ -154,12 +142,44 @@ def _apart(frames: FaceFrames, vertices: Ints, other: int) -> Floats:
     return np.asarray(np.linalg.norm(frames.points[vertices] - frames.points[other], axis=1))
 
 
-def _inner_edges(frames: FaceFrames) -> sp.csr_matrix:
+def inner_edges(frames: FaceFrames) -> sp.csr_matrix:
     """(V, V) lengths of the edges between vertices that are not on the boundary."""
     inner = ~frames.is_boundary[frames.edges].any(1)
     (v, w), lengths = frames.edges[inner].T, frames.lengths[inner]
     size = len(frames.points)
     return sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(size, size))
+
+
+def nearest_paths(
+    graph: sp.csr_matrix, sources: Ints, goals: Ints, radius: float, allowed: Bools | None = None
+) -> list[list[int]]:
+    """Shortest paths from goals to sources within a radius, the nearest pairs first; no vertex is an end of two.
+
+    Args:
+        graph: (V, V) lengths of edges.
+        sources: vertices.
+        goals: others.
+        radius: along edges.
+        allowed: (sources, goals) bool: pairs that may be joined; all by default.
+
+    Returns:
+        Vertices of each path, that of the goal first.
+    """
+    if not (len(sources) and len(goals)):
+        return []
+    lengths, before = dijkstra(graph, indices=sources, limit=radius, return_predecessors=True)
+    near = lengths[:, goals] if allowed is None else np.where(allowed, lengths[:, goals], np.inf)
+    paths: list[list[int]] = []
+    taken: set[int] = set()
+    for row, column in np.argwhere(np.isfinite(near))[np.argsort(near[np.isfinite(near)], kind="stable")].tolist():
+        source, goal = int(sources[row]), int(goals[column])
+        if taken.isdisjoint((source, goal)):
+            taken |= {source, goal}
+            path = [goal]
+            while path[-1] != source:
+                path.append(int(before[row, path[-1]]))
+            paths.append(path)
+    return paths
 
 
 def carried_charges(frames: FaceFrames, matched: Ints, steps: list[tuple[int, int, int]]) -> Ints:

@@ -6,11 +6,10 @@ import itertools
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import dijkstra
 
 from ..fields import Directions, FaceFrames, Symmetry, vertex_charges
 from ..fields.frames import Bools, Floats, Ints
-from ..fields.merging import carried_charges, refitted
+from ..fields.merging import carried_charges, inner_edges, nearest_paths, refitted
 
 Step = tuple[int, int, int]
 """Vertices from and to which a charge goes along an edge, and the charge."""
@@ -59,34 +58,14 @@ def with_room(
     return refitted(frames, angles, moved, directions, smoothing, touched, symmetry), moved
 
 
-def inner_edges(frames: FaceFrames) -> sp.csr_matrix:
-    """(V, V) lengths of the edges between vertices that are not on the boundary."""
-    inner = ~frames.is_boundary[frames.edges].any(1)
-    (v, w), lengths = frames.edges[inner].T, frames.lengths[inner]
-    size = len(frames.points)
-    return sp.csr_matrix((np.r_[lengths, lengths], (np.r_[v, w], np.r_[w, v])), shape=(size, size))
-
-
 def _onto_corners(
     frames: FaceFrames, graph: sp.csr_matrix, charges: Ints, stay: Bools, radius: float, trust: Floats
 ) -> list[Step]:
     """Charges that go onto corners of the other sign, the nearest first."""
     corners, others = np.flatnonzero(stay & (charges != 0)), np.flatnonzero(~stay & (charges != 0))
-    if not (len(corners) and len(others)):
-        return []
-    lengths, before = dijkstra(graph, indices=corners, limit=radius, return_predecessors=True)
-    near = np.where(np.outer(charges[corners], charges[others]) < 0, lengths[:, others], np.inf)
-    steps: list[Step] = []
-    taken: set[int] = set()
-    for row, column in np.argwhere(np.isfinite(near))[np.argsort(near[np.isfinite(near)], kind="stable")].tolist():
-        corner, start = int(corners[row]), int(others[column])
-        if taken.isdisjoint((corner, start)):
-            taken |= {corner, start}
-            path = [start]
-            while path[-1] != corner:
-                path.append(int(before[row, path[-1]]))
-            steps += [(a, b, int(charges[start])) for a, b in itertools.pairwise(path)]
-    return steps
+    opposite = np.outer(charges[corners], charges[others]) < 0
+    paths = nearest_paths(graph, corners, others, radius, opposite)
+    return [(a, b, int(charges[path[0]])) for path in paths for a, b in itertools.pairwise(path)]
 
 
 def _off_few_triangles(
