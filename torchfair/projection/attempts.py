@@ -13,7 +13,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from .evaluation import Evaluation, seen
+from .evaluation import Evaluation, Seen, seen
 from .layout import State
 from .proposal import Proposal
 
@@ -53,16 +53,15 @@ class Attempts:
         Terms whose data have to be found anew, such as closest points, come last: they cost most, and barriers of
         angles and areas have been seen by then.
         """
-        structure = self._structure
-        dear, found = [compiled.term.refresh is not None for compiled in structure.compiled], {}
-        for last in (False, True):
-            numbers = [number for number, is_dear in enumerate(dear) if is_dear is last]
-            for number in numbers:
-                found[number] = seen(structure.compiled[number].term, state)
+        terms = [compiled.term for compiled in self._structure.compiled]
+        found: dict[int, Seen] = {}
+        for refreshed in (False, True):
+            numbers = [number for number, term in enumerate(terms) if (term.refresh is not None) is refreshed]
+            found |= {number: seen(terms[number], state) for number in numbers}
             spoilt = self._spoilt(numbers, [found[number].contributions for number in numbers])
             if spoilt is not None:
                 return spoilt
-        return structure.summed(state, [found[number] for number in range(len(dear))])
+        return self._structure.summed(state, [found[number] for number in range(len(terms))])
 
     def spoilt(self, state: State, terms: Sequence[int]) -> Spoilt | None:
         """Where elements of some terms spoil a state."""

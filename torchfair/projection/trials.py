@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import torch
@@ -57,7 +58,6 @@ class Trials:
         ]
         self._promised: list[float] = proposal.predicted.tolist()
         self._best, self._change = state.evaluation, torch.zeros_like(self._start)
-        self._attempts: Attempts | None = None
         self.merits = [course.merit for course in state.courses]
         self.gains = [-math.inf for _ in state.courses]
         self.taken = [False for _ in state.courses]
@@ -175,9 +175,7 @@ class Trials:
 
     def _unspoilt(self, whole: Tensor) -> _Tried | None:
         """What the step of a large problem leads to, with that of unknowns halved whose elements spoil it."""
-        attempts = self._attempts or Attempts(self._state.evaluation, self._proposal)
-        self._attempts = attempts
-        change, left = whole, _HALVINGS
+        attempts, change, left = self._attempts, whole, _HALVINGS
         while left:
             with self._watch.part("merit"):
                 trial = attempts.evaluated(self._at(change))
@@ -188,6 +186,10 @@ class Trials:
                     change, left = torch.where(spoilt.unknowns, 0.5 * change, change), left - 1
                     spoilt = attempts.spoilt(self._at(change), spoilt.terms)
         return self._of_large(self._evaluate(change), change, whole)
+
+    @cached_property
+    def _attempts(self) -> Attempts:
+        return Attempts(self._state.evaluation, self._proposal)
 
     def _of_large(self, trial: Evaluation, change: Tensor, whole: Tensor) -> _Tried | None:
         """What it leads to; the whole step, shortened evenly, where it is not finite or, as the first, not downhill."""
@@ -223,11 +225,11 @@ class Trials:
         return self._problem.layout.unflatten(self._start + change)
 
     def _evaluate(self, change: Tensor, seen: Sequence[int] | None = None) -> Evaluation:
-        flat, structure = self._start + change, self._problem.structure
+        structure = self._problem.structure
         with self._watch.part("merit"):
             if seen is None:
-                return structure.evaluate(self._problem.layout.unflatten(flat))
-            return structure.evaluate_members(flat, list(seen))
+                return structure.evaluate(self._at(change))
+            return structure.evaluate_members(self._start + change, list(seen))
 
 
 class _Tried(NamedTuple):
