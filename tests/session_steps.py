@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 import torch
 from helpers import DOUBLE, grid_faces, split_quads
 from torch import Tensor
 
 from torchfair import Topology
 from torchfair.formfinding import FairRecipe, FairSettings, Session
+from torchfair.formfinding.job import Recipe
+
+R = TypeVar("R", bound=Recipe[Any])
 
 MIDDLE = 24  # of the sheet
 
@@ -31,12 +37,27 @@ def above(session: Session[FairRecipe], height: float, vertex: int = MIDDLE) -> 
     return place
 
 
-def drag(session: Session[FairRecipe], moves: int = 4, start: float = 0.0) -> list[float]:
-    """Lags of the handle behind its target after each move, in mean edges."""
+def dragged(
+    session: Session[R], handle: int, place: Callable[[float], list[float]], moves: int, start: float
+) -> list[float]:
+    """Lags of a handle behind its target after each move by a tenth of a mean edge, in mean edges.
+
+    Args:
+        session: Of any job.
+        handle: The vertex.
+        place: Where it is to be, by the height above where it started in mean edges.
+        moves: How many.
+        start: Height before the first.
+    """
     lags = []
     for number in range(1, moves + 1):
-        place = above(session, start + 0.1 * number)
-        session.move({MIDDLE: place})
+        target = place(start + 0.1 * number)
+        session.move({handle: target})
         assert session.step().accepted
-        lags.append(float((session.vertices[MIDDLE] - torch.tensor(place)).norm()) / session.recipe.unit.length)
+        lags.append(float((session.vertices[handle] - torch.tensor(target)).norm()) / session.recipe.unit.length)
     return lags
+
+
+def drag(session: Session[FairRecipe], moves: int = 4, start: float = 0.0) -> list[float]:
+    """Lags of the handle behind its target after each move, in mean edges."""
+    return dragged(session, MIDDLE, lambda height: above(session, height), moves, start)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 import torch
 from helpers import DOUBLE, random_rotation
+from session_steps import dragged
 from torch import Tensor
 
 from torchfair import MeshError
@@ -38,13 +39,7 @@ def above(session: Session[SymmetricRecipe], height: float, vertex: int = HANDLE
 
 def drag(session: Session[SymmetricRecipe], moves: int = 4, start: float = 0.0) -> list[float]:
     """Lags of the handle behind its target after each move, in mean edges."""
-    lags = []
-    for number in range(1, moves + 1):
-        place = above(session, start + 0.1 * number)
-        session.move({HANDLE: place})
-        assert session.step().accepted
-        lags.append(float((session.vertices[HANDLE] - torch.tensor(place)).norm()) / session.recipe.unit.length)
-    return lags
+    return dragged(session, HANDLE, lambda height: above(session, height), moves, start)
 
 
 def largest(measures: dict[str, float]) -> float:
