@@ -15,6 +15,8 @@ from torchfair.projection.evaluation import Evaluation
 from torchfair.projection.layout import State
 from torchfair.projection.proposal import Proposal
 from torchfair.projection.state import ProjectionState
+from torchfair.projection.stopwatch import Stopwatch
+from torchfair.projection.trials import Trials
 
 MANY = 40_000
 FEW = 12
@@ -154,6 +156,23 @@ def test_what_the_model_says_that_a_barrier_costs_is_not_dear() -> None:
         problem.layout.unflatten(state.blocks["x"][:, 0] + proposal.change)
     )
     assert isinstance(found, Evaluation)
+
+
+def test_longer_steps_than_that_of_the_model_stay_as_long_where_no_barrier_is() -> None:
+    """They are uphill in the model, by which they are not judged."""
+    blocks, terms = targets_with_walls(torch.full((FEW,), 1.5, dtype=torch.float64))
+    problem = GuidedProjection(blocks, terms)
+    state = init(problem, blocks)
+    proposal = proposed(problem, state)
+    trials = Trials(problem, state, proposal, None, Stopwatch())
+    trials.offer(proposal.change)
+    assert trials.taken == [True]
+    longer = 2.2 * proposal.change
+    assert float(proposal.system.predicted_fall(longer)) < 0.0
+    trial = trials.offer(longer, again=True)
+    assert trial is not None
+    assert bool((trial.state["x"][:FEW, 0] < 1.5).all())
+    torch.testing.assert_close(trial.state["x"][FEW:, 0], longer[FEW:], rtol=0, atol=0)
 
 
 def test_rises_are_those_of_the_model() -> None:
