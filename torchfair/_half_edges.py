@@ -99,9 +99,9 @@ def sort_keys(keys: Ints) -> tuple[Ints, Ints]:
         words = np.left_shift(keys, shift, dtype=np.uint64, casting="unsafe")
         words |= np.arange(keys.size, dtype=np.uint64)
         words.sort()
-        places = words & np.uint64((1 << shift) - 1)
+        order = (words & np.uint64((1 << shift) - 1)).view(np.int64)
         words >>= np.uint64(shift)
-        return places.view(np.int64), words.view(np.int64)
+        return order, words.view(np.int64)
     if keys.size < _RADIX:
         order = np.argsort(keys, kind="stable")
         return order, keys[order]

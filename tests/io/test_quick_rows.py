@@ -123,6 +123,32 @@ def test_digits_are_rounded_as_python_does(values: list[float], digits: int) -> 
         assert rows[1].tolist() == [len(values)]
 
 
+@settings(deadline=None, max_examples=1500)
+@given(
+    st.lists(st.text("0123456789+-.eE", min_size=1, max_size=7), min_size=1, max_size=5),
+    st.sampled_from([" ", "\n", " \t ", "\r\n", "\x0b", "\x1f", "\xa0"]),
+)
+@example(["+1", "-0", "+.5", "1.e5", "-.5E-3"], " ")
+@example(["1e", "1"], " ")
+@example(["1", "2-3"], " ")
+@example(["1.2e3.4", "1"], " ")
+@example(["1e2e3", "1", "1"], "\n")
+@example(["1.2.3", "1", "1"], "\n")
+def test_words_are_what_python_takes_for_numbers(words: list[str], blank: str) -> None:
+    """Or at least none of them is anything else."""
+    (text,) = portions(blank.join(words).encode("latin1") + b"\n")
+    rows = float_rows(text)
+    try:
+        expected = [float(word) for word in text.codes.tobytes().split()]
+    except ValueError:
+        assert rows is None
+        return
+    if rows is None:
+        assert ord(blank[0]) not in b" \t\r\n"
+    else:
+        assert np.array_equal(rows[0].view(np.int64), np.array(expected).view(np.int64))
+
+
 @pytest.mark.parametrize("text", [b"1-2 3 .", b"1-2 1e 3", b"1-2 1-2 .", b"1 2 -", b"."])
 def test_numbers_that_end_early_are_none(text: bytes) -> None:
     """Also where numpy only warns, and as many numbers come out as there are words."""

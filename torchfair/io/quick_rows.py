@@ -1,19 +1,19 @@
 """Rows of numbers in text at the speed of C: the quick way of the readers.
 
-Digits are read by ``numpy.fromstring``, which rounds correctly, as ``float`` does. Whatever is unusual gives None, and
-the careful reader, which knows the line of every fault, reads the file instead: nothing is accepted here that it would
-refuse, and errors are its own.
+Whatever is unusual gives None, and the careful reader, which knows the line of every fault, reads the file instead:
+nothing is accepted here that it would refuse, and errors are its own.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from .decimals import decimals
 from .raw_mesh import Floats, Ints
 
 Codes = npt.NDArray[np.uint8]
@@ -22,12 +22,9 @@ Mask = npt.NDArray[np.bool_]
 PORTION = 1 << 22
 """Bytes that are looked at together: few enough for the cache and the memory, enough for little overhead."""
 _SPACE, _NEWLINE = 32, 10
-_BLANKS = b" \t\r\n"
-_FLOAT = b"0123456789+-.eE" + _BLANKS
-_INT = b"0123456789+-" + _BLANKS
+_INT = b"0123456789+- \t\r\n"
 _MOST_DIGITS = 18  # more may not fit into 64 bits
 _PLUS, _MINUS, _ZERO = b"+-0"
-_LAST, _LAST_VALUE = b"8.25e-217", 8.25e-217
 
 
 class Portion(NamedTuple):
@@ -55,7 +52,7 @@ class Portion(NamedTuple):
 
 def is_usual(data: bytes) -> bool:
     """Whether bytes are text in lines that end with a newline, maybe after a carriage return."""
-    return b"\0" not in data and data.count(b"\r") == data.count(b"\r\n")
+    return b"\0" not in data and (b"\r" not in data or data.count(b"\r") == data.count(b"\r\n"))
 
 
 def portions(data: bytes, start: int = 0) -> Iterator[Portion]:
@@ -71,12 +68,9 @@ def portions(data: bytes, start: int = 0) -> Iterator[Portion]:
 
 def float_rows(text: Portion) -> tuple[Floats, Ints] | None:
     """Numbers of a text, and how many stand on each line; None if a word is no plain decimal number."""
-    counted = _word_starts(text)
-    values = _values(text.codes.tobytes() + _LAST, np.float64, _FLOAT)  # the last number is missed where it ends early
-    if values is None or not values.size or values[-1] != _LAST_VALUE:
-        return None
-    values = values[:-1]
-    return (values, counted[1]) if values.size == counted[0].size else None
+    starts, sizes = _word_starts(text)
+    values = decimals(text.codes, starts)
+    return None if values is None else (values, sizes)
 
 
 def int_rows(text: Portion) -> tuple[Ints, Ints] | None:
@@ -87,7 +81,7 @@ def int_rows(text: Portion) -> tuple[Ints, Ints] | None:
     signs = np.flatnonzero((text.codes == _MINUS) | (text.codes == _PLUS))
     if (text.codes[signs + 1] < _ZERO).any():  # a newline is behind the last one
         return None  # numpy reads a lone sign as a zero
-    values = _values(text.codes.tobytes(), np.int64, _INT)
+    values = _whole_numbers(text.codes.tobytes()) if starts.size else np.zeros(0, np.int64)
     return None if values is None or values.size != starts.size else (values, sizes)
 
 
@@ -105,19 +99,17 @@ def _word_starts(text: Portion) -> tuple[Ints, Ints]:
     return starts, np.diff(np.searchsorted(starts, text.ends), prepend=0)
 
 
-def _values(data: bytes, dtype: type, alphabet: bytes) -> npt.NDArray[Any] | None:
-    """The numbers of a text; None if there is anything else in it.
+def _whole_numbers(data: bytes) -> Ints | None:
+    """The whole numbers of a text; None if there is anything else in it.
 
-    A word such as ``1-2`` gives two, one such as ``1e`` ends the list: those who call compare how many there are.
+    A word such as ``1-2`` gives two: those who call compare how many there are.
     """
-    if data.translate(None, alphabet):
+    if data.translate(None, _INT):
         return None
-    if not data.strip():
-        return np.zeros(0, dtype)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # given where the text ends early
-            values: npt.NDArray[Any] = np.fromstring(data, dtype, sep=" ")
+            values: Ints = np.fromstring(data, np.int64, sep=" ")
             return values
     except ValueError:
         return None
