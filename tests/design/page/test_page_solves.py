@@ -53,9 +53,12 @@ def test_nothing_moves_while_it_is_paused(hall_window: Window) -> None:
 
 def test_a_whole_job_is_stopped_and_can_be_undone(hall_window: Window) -> None:
     window = hall_window
-    before, number = window.positions(), window("design.store.frame.number")
+    before = window.positions()
+    window("window.before = Array.from(design.scene.mesh.positions)")
     window.page.click("[data-action=solve]")
-    window.wait(f"design.store.state.state === 'RUNNING' && design.store.frame.number > {number}")
+    window.wait(  # the first frame of a job has not moved
+        "design.store.state.state === 'RUNNING' && window.before.some((x, k) => x !== design.scene.mesh.positions[k])"
+    )
     window.page.click("[data-action=stop]")
     window.at_rest()
     assert window("design.store.numbers.status") == "stopped"
