@@ -24,7 +24,7 @@ FLOORS = (
         "progress",
         "rasterisation",
     },
-    {"_atomic", "_face_hints", "_mesh_sizes", "_mesh_sums", "_packed_tensors", "settings"},
+    {"_atomic", "_face_hints", "_mesh_sizes", "_mesh_sums", "_packed_tensors", "_side_by_side", "settings"},
     {"_half_edges", "_joined_tables"},
     {"_connectivity", "projection"},
     {"_topology_tables"},

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 _LARGE = 300_000  # unknowns
-_MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # numbers of parameters in malloc.h of the GNU C library
+_MMAP_THRESHOLD, _TRIM_THRESHOLD, _ARENA_MAX = -3, -1, -8  # numbers of parameters in malloc.h of the GNU C library
 _KEPT = 1 << 26  # bytes: larger pieces are given back, or holes that nothing fits into would double the peak
 _SYSTEM = Path("/proc/meminfo")
 _GROUP = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current"))  # of a container
@@ -40,6 +40,7 @@ def keep_freed_memory() -> bool:
     and end. Nothing happens on other systems.
     """
     kept = _of_c_library("mallopt", _MMAP_THRESHOLD, _KEPT)
+    _of_c_library("mallopt", _ARENA_MAX, 1)  # else each thread keeps memory of its own
     return bool(kept) and bool(_of_c_library("mallopt", _TRIM_THRESHOLD, -1))
 
 

@@ -42,6 +42,16 @@ def test_pieces_below_the_bound_are_kept_from_the_start() -> None:
     assert after < 64
 
 
+def test_threads_use_what_others_have_freed() -> None:
+    count = _COUNT.replace("print(", "from concurrent.futures import ThreadPoolExecutor as Pool\nprint(")
+    count = count.replace("before, faults())", "before, Pool(1).submit(faults).result())")
+    words = subprocess.run([sys.executable, "-c", count], capture_output=True, text=True, check=True).stdout.split()
+    kept, before, after = map(int, words)
+    if not kept:
+        pytest.skip("not the GNU C library")
+    assert after < before / 4
+
+
 @pytest.mark.parametrize("name", ["measure", "diagnose", "reflect"])
 def test_processes_of_their_own_keep_memory(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The program does, a call of ``main`` in another program does not."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from ._height_rows import Members, members_of, shares, terms
+from .._side_by_side import side_by_side
+from ._height_rows import NUMBERS_OF_MEMBER, Members, members_of, shares, terms
 from ._ops import gather
-from .patches import Patches
+from .patches import Patches, PatchGroup
 from .tangent_basis import tangent_bases
 
 _RIDGE = 1e-13  # keeps what the members leave open at zero, higher orders first
@@ -44,12 +46,13 @@ def fitted_normals(vertices: Tensor, normals: Tensor, patches: Patches) -> Tenso
     Members count as in :func:`fitted_heights`. Zero where ``normals`` (*batch, V, 3) are.
     """
     frames, least = _frames(normals), _least(2, normals.device)
-    slopes = []
-    for group in patches.groups:
+
+    def slopes(group: PatchGroup) -> Tensor:
         matrix, right, _ = _normal_equations(members_of(vertices, normals, frames, group).rows(2))
         low = _low_rows(_root(matrix + torch.diag(least)))
-        slopes.append((low @ right).squeeze(-1)[..., 1:3])
-    return turned_normals(frames, patches.in_order(slopes))
+        return (low @ right).squeeze(-1)[..., 1:3]
+
+    return turned_normals(frames, patches.in_order(side_by_side(slopes, patches.groups, vertices)))
 
 
 def turned_normals(frames: Tensor, slopes: Tensor) -> Tensor:
@@ -85,25 +88,36 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     # Matrices of all vertices would take kilobytes for each, so they are made for one group of patches at a time, and
     # made again where they are needed once more: of what they are made of, as far as that was kept.
     kept: dict[int, Members] = {}
-    fits, room = [], _KEPT
-    for number, group in enumerate(patches.groups):
-        members = members_of(vertices, normals, frames, group)
-        fits.append(_plain_fit(members, least, degree))
-        room -= members.numbers
-        if room >= 0:
+    last = _last_kept(vertices, patches)
+
+    def plain_fit(number: int) -> _Fit:
+        members = members_of(vertices, normals, frames, patches.groups[number])
+        if number < last:
             kept[number] = members
+        return _plain_fit(members, least, degree)
+
+    fits = side_by_side(plain_fit, range(len(patches.groups)), vertices)
     coefficients, spread, variance = (patches.in_order([fit[i] for fit in fits]) for i in range(3))
     scale = patches.in_order([fit.scale for fit in fits]).squeeze(-1)
     fits.clear()
     variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
-    believed = []
-    for number, group in enumerate(patches.groups):
-        found = kept.pop(number, None)
+
+    def believed_fit(number: int) -> tuple[Tensor, Tensor]:
+        group, found = patches.groups[number], kept.pop(number, None)
         members = members_of(vertices, normals, frames, group) if found is None else found
         own = gather(doubts, group.centres), gather(variance[..., None], group.centres).squeeze(-1)
-        believed.append(_believed_fit(members, least, *own, degree))
+        return _believed_fit(members, least, *own, degree)
+
+    believed = side_by_side(believed_fit, range(len(patches.groups)), vertices)
     coefficients, uncertainty = (patches.in_order([fit[i] for fit in believed]) for i in range(2))
     return Heights(frames, scale, coefficients, uncertainty.squeeze(-1))
+
+
+def _last_kept(vertices: Tensor, patches: Patches) -> int:
+    """How many of the first groups have members that may all be kept."""
+    sizes = [group.members.numel() * NUMBERS_OF_MEMBER for group in patches.groups]
+    room = _KEPT // max(1, vertices.shape[:-2].numel())
+    return sum(total <= room for total in itertools.accumulate(sizes))
 
 
 class _Fit(NamedTuple):

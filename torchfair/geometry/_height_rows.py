@@ -11,6 +11,9 @@ from torch import Tensor
 from ._ops import gather
 from .patches import PatchGroup
 
+NUMBERS_OF_MEMBER = 4
+"""Of which :class:`Members` consists: the root of its weight, and three for its place."""
+
 
 def terms(degree: int) -> list[tuple[int, int]]:
     """Order of each term ``x^(order - k) y^k`` of a polynomial, and k; high orders first.
@@ -40,11 +43,6 @@ class Members(NamedTuple):
     roots: Tensor
     places: Tensor
     scale: Tensor
-
-    @property
-    def numbers(self) -> int:
-        """How many numbers are held."""
-        return sum(part.numel() for part in self)
 
     @property
     def total(self) -> Tensor:

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from .._numbers import check_count
+from .._side_by_side import side_by_side
 from ..topology import Topology
 from ._ops import gather
 
@@ -62,11 +63,12 @@ class Patches:
 
     def means(self, values: Tensor) -> Tensor:
         """Means of the values (*batch, V, d) of the members: (*batch, V, d)."""
-        parts = []
-        for _, members, present in self.groups:
-            shares = present.to(values) / present.sum(1, keepdim=True)
-            parts.append((gather(values, members) * shares[..., None]).sum(-2))
-        return self.in_order(parts)
+
+        def mean(group: PatchGroup) -> Tensor:
+            shares = group.present.to(values) / group.present.sum(1, keepdim=True)
+            return (gather(values, group.members) * shares[..., None]).sum(-2)
+
+        return self.in_order(side_by_side(mean, self.groups, values))
 
     @property
     def sizes(self) -> Tensor:

@@ -178,8 +178,7 @@ def diagnose_mesh(vertices: Tensor, topology: Topology) -> Diagnosis:
         ShapeError: if ``vertices`` are not one mesh that fits the topology.
     """
     vertices = one_mesh(vertices, topology)
-    # Stars are judged in small chunks: waking a second thread for each operation costs more than it saves.
-    with threads_for(0, vertices.device):
+    with threads_for(vertices.numel(), vertices.device):
         return Diagnosis(
             topology=topology,
             classes=classify_stars(vertices, topology),

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from .._names import PlacedError
+from .._side_by_side import side_by_side
 from ..errors import ShapeError, TorchfairError
 from ..geometry import fitted_curvature, star_normals
 from ..geometry._ops import cross, gather
@@ -176,7 +177,11 @@ def _side_angles(vertices: Tensor, topology: Topology, crosses: _Crosses, rule: 
     directions, normals = crosses.directions, star_normals(vertices, topology)
     # The angle at an end is told by the products of the edge with a direction and with that turned in the surface.
     both = torch.cat([directions, cross(normals[:, None].expand_as(directions), directions)], 1)
-    parts = [_edge_angles(vertices, both, crosses.confidence, ends) for ends in torch.split(topology.edges, _EDGES)]
+    parts = side_by_side(
+        lambda ends: _edge_angles(vertices, both, crosses.confidence, ends),
+        torch.split(topology.edges, _EDGES),
+        vertices,
+    )
     nearest, which = (torch.cat(found) for found in zip(*parts, strict=True))
     values: Floats = torch.where(nearest.isinf(), torch.nan, nearest).cpu().numpy()
     fields: Ints = which.cpu().numpy()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from .._loading import safe_to_load
-from ..geometry import corner_angles, face_normals
 from ..geometry._ops import cross, dot
 from ..topology import Topology
 
@@ -37,6 +37,15 @@ def star_groups(topology: Topology) -> list[StarGroup]:
     return [StarGroup(*group, corners[valence]) for valence, group in topology.rings_by_valence.items()]
 
 
+def parts_of(groups: Iterable[StarGroup], most: int) -> list[StarGroup]:
+    """The same stars in smaller groups, of at most so many."""
+    return [
+        StarGroup(*(tensor[start : start + most] for tensor in group))
+        for group in groups
+        for start in range(0, group.centres.shape[0], most)
+    ]
+
+
 class Arms(NamedTuple):
     """Stars to be judged, all with k arms, in float64.
 
@@ -51,7 +60,14 @@ class Arms(NamedTuple):
     noise: Tensor
 
 
-def star_arms(vertices: Tensor, topology: Topology, group: StarGroup) -> list[Arms]:
+class Planes(NamedTuple):
+    """What is known of the faces of a mesh: unit normals (F, 3), and angles (C,) at their corners."""
+
+    normals: Tensor
+    angles: Tensor
+
+
+def star_arms(vertices: Tensor, topology: Topology, planes: Planes, group: StarGroup) -> list[Arms]:
     """Arms of the stars of a group; ``vertices`` is one mesh ``(V, 3)``.
 
     A corner of a polygon that is straight or reflex is cut in two by a further arm along its bisector, so that
@@ -64,7 +80,7 @@ def star_arms(vertices: Tensor, topology: Topology, group: StarGroup) -> list[Ar
     eps = torch.finfo(vertices.dtype).eps
     if topology.is_triangular:
         return [Arms(group.centres, arms, rounding_angle(arms, scale, eps))]
-    normals, angles, wide = _wide_corners(vertices, topology, group)
+    normals, angles, wide = _wide_corners(topology, planes, group)
     count = wide.sum(1)
     parts = []
     for chosen in (count == 0, count == 1):
@@ -76,7 +92,9 @@ def star_arms(vertices: Tensor, topology: Topology, group: StarGroup) -> list[Ar
     return parts
 
 
-def corner_planes(vertices: Tensor, topology: Topology, group: StarGroup, arms: Tensor) -> tuple[Tensor, Tensor]:
+def corner_planes(
+    vertices: Tensor, topology: Topology, planes: Planes, group: StarGroup, arms: Tensor
+) -> tuple[Tensor, Tensor]:
     """Unit normals (n, k, 3) of the sectors between the ``arms`` of a group, and the noise (n,) of their directions.
 
     At straight and reflex corners of polygons the sector has the normal of its face.
@@ -86,15 +104,15 @@ def corner_planes(vertices: Tensor, topology: Topology, group: StarGroup, arms: 
     sectors = sector_normals(arms)
     if topology.is_triangular:
         return sectors, noise
-    normals, _, wide = _wide_corners(vertices, topology, group)
+    normals, _, wide = _wide_corners(topology, planes, group)
     return torch.where(wide[..., None], normals, sectors), noise
 
 
-def _wide_corners(vertices: Tensor, topology: Topology, group: StarGroup) -> tuple[Tensor, Tensor, Tensor]:
+def _wide_corners(topology: Topology, planes: Planes, group: StarGroup) -> tuple[Tensor, Tensor, Tensor]:
     """Face normals (n, k, 3), corner angles (n, k), and mask (n, k) of the straight and reflex corners of polygons."""
     faces = topology.corner_faces[group.corners]
-    normals = face_normals(vertices, topology)[faces].to(torch.float64)
-    angles = corner_angles(vertices, topology)[group.corners].to(torch.float64)
+    normals = planes.normals[faces].to(torch.float64)
+    angles = planes.angles[group.corners].to(torch.float64)
     return normals, angles, (angles > _STRAIGHT) & (topology.face_sizes[faces] > 3)
 
 

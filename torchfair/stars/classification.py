@@ -10,12 +10,13 @@ import torch
 from torch import Tensor
 
 from .._one_mesh import one_mesh
+from .._side_by_side import side_by_side
 from ..geometry import corner_angles, face_normals
 from ..geometry._ops import dot
 from ..geometry.angles import defects
 from ..geometry.normals import angle_weighted
 from ..topology import Topology
-from ._groups import StarGroup, corner_planes, star_arms, star_groups
+from ._groups import Planes, StarGroup, corner_planes, parts_of, star_arms, star_groups
 from ._judge import edge_signs, judge_stars
 from ._patterns import run_lengths
 
@@ -145,14 +146,15 @@ def classify_stars(vertices: Tensor, topology: Topology) -> StarClasses:
         ShapeError: if ``vertices`` is not a floating tensor (V, 3).
     """
     vertices = one_mesh(vertices, topology)
-    normals, angles = face_normals(vertices, topology), corner_angles(vertices, topology)
-    classes = _empty(defects(angles, topology), topology, torch.finfo(vertices.dtype).eps)
-    ordinary = angle_weighted(normals, angles, topology).to(torch.float64)
-    for group in star_groups(topology):
-        for start in range(0, group.centres.shape[0], _CHUNK):
-            part = StarGroup(*(tensor[start : start + _CHUNK] for tensor in group))
-            _judge(vertices, classes, part)
-            _take_sides(vertices, classes, part, ordinary[part.centres])
+    planes = Planes(face_normals(vertices, topology), corner_angles(vertices, topology))
+    classes = _empty(defects(planes.angles, topology), topology, torch.finfo(vertices.dtype).eps)
+    ordinary = angle_weighted(planes.normals, planes.angles, topology).to(torch.float64)
+
+    def judge(part: StarGroup) -> None:
+        _judge(vertices, classes, planes, part)
+        _take_sides(vertices, classes, planes, part, ordinary[part.centres])
+
+    side_by_side(judge, parts_of(star_groups(topology), _CHUNK), vertices)
     return classes
 
 
@@ -178,10 +180,10 @@ def _empty(defects: Tensor, topology: Topology, eps: float) -> StarClasses:
     )
 
 
-def _judge(vertices: Tensor, classes: StarClasses, group: StarGroup) -> None:
+def _judge(vertices: Tensor, classes: StarClasses, planes: Planes, group: StarGroup) -> None:
     """Fills in kinds, good saddles and normals of the stars of a group."""
     classes.kinds[group.centres] = int(StarKind.NEITHER)
-    for centres, arms, noise in star_arms(vertices, classes.topology, group):
+    for centres, arms, noise in star_arms(vertices, classes.topology, planes, group):
         verdicts = judge_stars(arms, noise)
         classes.kinds[centres] = verdicts.kinds
         classes.good[centres] = verdicts.good
@@ -189,11 +191,11 @@ def _judge(vertices: Tensor, classes: StarClasses, group: StarGroup) -> None:
         classes.degenerate[centres] = ~torch.isfinite(noise)
 
 
-def _take_sides(vertices: Tensor, classes: StarClasses, group: StarGroup, ordinary: Tensor) -> None:
+def _take_sides(vertices: Tensor, classes: StarClasses, planes: Planes, group: StarGroup, ordinary: Tensor) -> None:
     """Fills in what is said edge by edge and face by face; ``ordinary`` (n, 3) are the vertex normals."""
     centres, ring, corners = group
     arms = (vertices[ring] - vertices[centres][:, None]).to(torch.float64)
-    sectors, noise = corner_planes(vertices, classes.topology, group, arms)
+    sectors, noise = corner_planes(vertices, classes.topology, planes, group, arms)
     arms = arms / torch.linalg.vector_norm(arms, dim=-1, keepdim=True)
     places = classes.topology.ring_offsets[centres, None] + torch.arange(ring.shape[1], device=ring.device)
     classes.sides[places] = _sides(arms, classes.normals[centres], noise)

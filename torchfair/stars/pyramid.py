@@ -7,12 +7,13 @@ import math
 import torch
 from torch import Tensor
 
+from .._side_by_side import side_by_side
 from ..errors import MeshError
 from ..geometry import corner_angles, dihedral_angles, face_normals
 from ..geometry._ops import cross, dot, gather, scatter_sum
 from ..geometry.normals import angle_weighted
 from ..topology import Topology
-from ._groups import star_groups
+from ._groups import StarGroup, parts_of, star_groups
 from .arcs import arc_crossings
 
 _ROOM = 1 << 18  # entries of the tables of one chunk of pyramids: few enough for the cache
@@ -93,13 +94,14 @@ def pyramid_self_intersections(vertices: Tensor, topology: Topology) -> Tensor:
     normals, noise = face_normals(vertices, topology), normal_noise(vertices, topology)
     counts = torch.zeros(vertices.shape[:-1], dtype=torch.int64, device=vertices.device)
     batch = max(1, math.prod(vertices.shape[:-2]))
-    for centres, ring, corners in star_groups(topology):
-        step = max(1, _ROOM // (batch * ring.shape[1] ** 2))
-        for start in range(0, centres.shape[0], step):
-            faces = topology.corner_faces[corners[start : start + step]]
-            doubtful = noise[..., faces].amax(-1)
-            crossings = arc_crossings(gather(normals, faces), doubtful)
-            counts[..., centres[start : start + step]] = crossings.sum((-2, -1)) // 2
+
+    def count(part: StarGroup) -> None:
+        faces = topology.corner_faces[part.corners]
+        crossings = arc_crossings(gather(normals, faces), noise[..., faces].amax(-1))
+        counts[..., part.centres] = crossings.sum((-2, -1)) // 2
+
+    for group in star_groups(topology):
+        side_by_side(count, parts_of([group], max(1, _ROOM // (batch * group.ring.shape[1] ** 2))), vertices)
     return counts
 
 
@@ -126,16 +128,17 @@ def pyramid_windings(vertices: Tensor, topology: Topology) -> Tensor:
     axes = angle_weighted(normals, corner_angles(vertices, topology), topology)
     windings = torch.zeros(vertices.shape[:-1], dtype=torch.int64, device=vertices.device)
     batch = max(1, math.prod(vertices.shape[:-2]))
+
+    def wind(part: StarGroup) -> None:
+        axis = gather(axes, part.centres)[..., None, :]
+        rows = gather(normals, topology.corner_faces[part.corners])
+        rows = rows - dot(rows, axis)[..., None] * axis
+        ahead = rows.roll(-1, -2)
+        turns = torch.atan2(dot(cross(rows, ahead), axis), dot(rows, ahead)).sum(-1) / (2 * math.pi)
+        windings[..., part.centres] = torch.nan_to_num(turns).round().to(torch.int64)
+
     for group in star_groups(topology):
-        step = max(1, _POINTS // (batch * group.ring.shape[1]))
-        for start in range(0, group.centres.shape[0], step):
-            centres, corners = (tensor[start : start + step] for tensor in (group.centres, group.corners))
-            axis = gather(axes, centres)[..., None, :]
-            rows = gather(normals, topology.corner_faces[corners])
-            rows = rows - dot(rows, axis)[..., None] * axis
-            ahead = rows.roll(-1, -2)
-            turns = torch.atan2(dot(cross(rows, ahead), axis), dot(rows, ahead)).sum(-1) / (2 * math.pi)
-            windings[..., centres] = torch.nan_to_num(turns).round().to(torch.int64)
+        side_by_side(wind, parts_of([group], max(1, _POINTS // (batch * group.ring.shape[1]))), vertices)
     return windings
 
 
