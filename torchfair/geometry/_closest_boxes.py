@@ -34,7 +34,8 @@ class BoxTree:
     def __init__(self, low: Floats, high: Floats) -> None:
         self.items, empty = _median_order(low + high)
         # With the upper corner negated one minimum merges both corners; no point is near an empty box.
-        boxes = np.concatenate([low, -high])[:, self.items]
+        # Rows are contiguous: of others `take` copies the whole level each time.
+        boxes = np.concatenate([low, -high]).take(self.items, axis=1)
         boxes[:, empty] = np.inf
         levels = [boxes]
         while levels[-1].shape[1] > 1:

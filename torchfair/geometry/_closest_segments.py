@@ -25,7 +25,8 @@ class Segments:
         level = APART * curves[None]
         boxes = np.concatenate([np.minimum(starts, ends), level]), np.concatenate([np.maximum(starts, ends), level])
         self.tree = BoxTree(*boxes)
-        self._starts, self._ends, self._edges = starts, ends, ends - starts
+        self._starts, self._ends = np.ascontiguousarray(starts), np.ascontiguousarray(ends)  # see BoxTree
+        self._edges = self._ends - self._starts
         squared = dot(self._edges, self._edges)
         # A segment without length is its start: divided by infinity every point is at fraction 0.
         self._squared = np.where(squared > TINY, squared, np.inf)

@@ -21,8 +21,9 @@ class PieceTracker:
     anchor. Of the candidates only those are measured whose distance from the anchor was at most the
     distance to the last piece + m.
 
-    Gathering candidates costs as much as two searches. So it is left, for a point, until its last step was
-    short enough for them to serve several times; before that ``radius`` is the distance to the nearest piece.
+    Far from the shape many pieces are about as near, and gathering costs as much as two searches. So candidates
+    of a point are gathered once its last step was short enough for them to serve several times, or at once if it
+    starts nearer to the shape than they reach; before that ``radius`` is the distance to the nearest piece.
     """
 
     def __init__(self, shape: Shape) -> None:
@@ -65,7 +66,13 @@ class PieceTracker:
         self._candidates = np.zeros((count, _CANDIDATES), np.int32)
         self._distances = np.full((count, _CANDIDATES), np.inf)
         self._last = self._shape.guess(points)
-        self._search(np.arange(count), points, np.zeros(count))
+        skin = self._skin[self._last]
+        self._search(np.arange(count), points, np.where(self._reach(points) < skin, skin, 0.0))
+
+    def _reach(self, points: Floats) -> Floats:
+        """Distances (N,) of all the points (d, N) from their last pieces."""
+        blocks = [slice(first, first + BLOCK) for first in range(0, max(points.shape[1], 1), BLOCK)]
+        return np.concatenate([np.sqrt(self._shape.squared_distances(points[:, b], self._last[b])) for b in blocks])
 
     def _search(self, rows: Ints, points: Floats, skin: Floats) -> None:
         """Searches some rows of all the points (d, N) anew; ``skin`` has one entry for each of them."""

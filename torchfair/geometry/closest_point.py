@@ -109,7 +109,7 @@ class ReferenceSurface:
         corners = self._point_normals(topology)[self.pieces].numpy().transpose(1, 2, 0)
         flat = unit_normal(self.points[self.pieces]).numpy().T
         self._corner_normals: Floats = np.ascontiguousarray(corners)
-        self._normals = np.where(flat.any(0), flat, _unit(corners.sum(0), flat))
+        self._normals: Floats = np.ascontiguousarray(np.where(flat.any(0), flat, _unit(corners.sum(0), flat)))
 
     def _point_normals(self, topology: Topology) -> Tensor:
         """Vertex normals, then face normals at the centres of fans: (P, 3)."""
