@@ -12,7 +12,6 @@ from torch import Tensor
 from ..._names import few_groups, sentence
 from ...energies import angle_variation, normal_variation, total_absolute_curvature, total_mean_curvature
 from ...geometry import corner_angles, edge_lengths, face_areas, face_normals
-from ...geometry.closest_point import ReferenceSurface
 from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
 from ..job.promises import Promise, handle_promise
@@ -48,7 +47,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
     topology = problem.topology
     normalised = unit.apply(vertices)
     distances = problem.near.distances(normalised)[topology.valences > 0]
-    back = ReferenceSurface(normalised, topology).closest(problem.near.points).distances
+    back = problem.near.largest_distance_back(normalised, topology, like_start=problem.near_input)
     areas, lengths = face_areas(vertices, topology), edge_lengths(vertices, topology)
     ratios, growth = areas / face_areas(start, topology), areas / own_sizes(start, topology)
     turned = (face_normals(vertices, topology) * face_normals(start, topology)).sum(1)
@@ -69,8 +68,8 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "mean_edge_length": float(lengths.mean()),  # zero where all shrinks to a point
         "largest_distance": unit.length * float(distances.max()),
         "largest_distance_relative": float(distances.max()) / problem.input_edge,
-        "largest_distance_back": unit.length * float(back.max()),
-        "largest_distance_back_relative": float(back.max()) / problem.input_edge,
+        "largest_distance_back": unit.length * back,
+        "largest_distance_back_relative": back / problem.input_edge,
         "largest_boundary_distance": unit.length * _largest(strayed),
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
         "smallest_area_ratio": float(ratios.min()),

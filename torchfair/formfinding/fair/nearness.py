@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 
 import torch
 from torch import Tensor
@@ -11,6 +12,7 @@ from torch import Tensor
 from ... import constraints as c
 from ...constraints.closeness import Feet
 from ...geometry import ReferenceSurface, closest_on, face_centres
+from ...geometry._closest_farthest import largest_distance
 from ...geometry.reference import Reference
 from ...progress import phase
 from ...projection import ElementTerm
@@ -42,7 +44,6 @@ class Nearness:
         notes: Where decisions are told, in words.
 
     Attributes:
-        surface: With closest points.
         points: (n, 3) points on it: its vertices; of a function those nearest to the vertices and to the centres of the
             faces of the start.
         limit: As given.
@@ -66,22 +67,36 @@ class Nearness:
         self._vertices, self._pulls, self._boundary = vertices, pulls, boundary
         self._used = topology.valences > 0
         self.limit, self._input_edge, self._notes = limit, input_edge, notes
-        with phase("preparing the reference surface"):
-            self.surface = surface_of(reference)
-            self.points = _points_on(self.surface, reference, vertices, topology)
+        self._reference, self._is_start = reference, isinstance(reference, tuple) and reference[0] is vertices
         self.design_mode = False
         self.forget()
+        if self._is_start:  # the surface is made once something leaves it
+            self.points = vertices[self._used]
+        else:
+            with phase("preparing the reference surface"):
+                self.points = _points_on(self.surface, reference, vertices, topology)
         with phase("distances from the reference surface"):
             self.limits = self.allowed = self._limits()
 
+    @cached_property
+    def surface(self) -> Reference:
+        """With closest points; of the start itself it is made when first asked for."""
+        with phase("preparing the reference surface"):
+            return surface_of(self._reference)
+
     def forget(self) -> None:
         """Makes searches for closest points anew."""
-        self._planes: Feet = c.TangentPlanes(self.surface)
+        self._feet: Feet | None = None
+
+    def _planes(self, state: State) -> tuple[Tensor, Tensor]:
+        if self._feet is None:
+            self._feet = c.TangentPlanes(self.surface)
+        return self._feet(state)
 
     def trace(self, vertices: Tensor) -> None:
         """Makes planes from now on differentiable functions of the vertices (R, 3) of the surface, a mesh."""
         assert isinstance(self.surface, ReferenceSurface)
-        self._planes = TracedPlanes(self.surface, vertices)
+        self._feet = TracedPlanes(self.surface, vertices)
 
     # ---- decisions -------------------------------------------------------------------------------------
 
@@ -169,9 +184,30 @@ class Nearness:
 
     def distances(self, vertices: Tensor) -> Tensor:
         """(V,) distances from the reference surface or, where a vertex glides on a curve that is nearer, from that."""
+        if self._is_reference(vertices):
+            return vertices.new_zeros(len(vertices))
         positions, _ = self._nearest({"vertices": vertices})
         distances: Tensor = torch.linalg.vector_norm(vertices - positions, dim=1)
         return distances
+
+    def largest_distance_back(self, vertices: Tensor, topology: Topology, *, like_start: bool) -> float:
+        """Largest distance of :attr:`points` from a mesh (V, 3).
+
+        Args:
+            vertices: Of the mesh.
+            topology: Its connectivity.
+            like_start: Whether its vertices are near those of the reference that have the same numbers.
+        """
+        if self._is_reference(vertices):
+            return 0.0
+        owners = None
+        if like_start and isinstance(self._reference, tuple):
+            owners = torch.nonzero(self._reference[1].valences > 0).squeeze(1)
+        return largest_distance(self.points, vertices, topology, owners)
+
+    def _is_reference(self, vertices: Tensor) -> bool:
+        """Whether these are the vertices of the reference itself: they are on it, without being looked for."""
+        return self._is_start and torch.equal(vertices[self._used], self.points)
 
     def _near_surface(self, state: State) -> tuple[Tensor, Tensor]:
         """Closest points on the surface and normals there; where it is given up, nothing that costs."""
