@@ -52,6 +52,16 @@ def disturb(monkeypatch: pytest.MonkeyPatch, place: str, n: int, act: Act) -> No
     monkeypatch.setattr(owner, name, nth(getattr(owner, name), n, act, after=True))
 
 
+def count_calls(monkeypatch: pytest.MonkeyPatch, place: str) -> list[int]:
+    """One entry for each call of a function from now on."""
+    calls: list[int] = []
+    module, name = place.split(":")
+    owner = importlib.import_module(f"torchfair.formfinding.{module}")
+    function = getattr(owner, name)
+    monkeypatch.setattr(owner, name, lambda *given, **named: (calls.append(1), function(*given, **named))[1])
+    return calls
+
+
 def quads(n: int = 5) -> tuple[Tensor, Topology]:
     """Warped quads over a bent grid."""
     x, y = torch.meshgrid(*(torch.arange(n, dtype=DOUBLE) - n // 2,) * 2, indexing="ij")
@@ -105,6 +115,22 @@ def test_lowering_e_keeps_the_stages_done(phase: str, act: Act, monkeypatch: pyt
     assert result.before == whole.before
     assert result.after["normal_variation"] <= result.before["normal_variation"] * (1.0 + 1e-12)
     assert result.projection.residuals[0].elements > 0
+
+
+@WAYS
+def test_an_interrupt_while_the_start_is_measured_does_again_just_that(
+    act: Act, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On large meshes every part takes seconds: the mesh is not prepared again, and a start that stays not measured."""
+    counts = {place: count_calls(monkeypatch, place) for place in ("job.recipe:one_start", "fair.recipe:fair_measures")}
+    disturb(monkeypatch, "fair.recipe:fair_measures", 1, act)
+    vertices, topology = quads()
+    result = minimise_normal_variation(vertices, topology, settings=replace(FAIR, boundary="fixed"))
+    assert result.projection.status is Status.INTERRUPTED
+    assert torch.equal(result.vertices, vertices)
+    assert result.after == result.before
+    measured = 1 + (act is stop)  # Ctrl-C waits until it is measured
+    assert [len(calls) for calls in counts.values()] == [1, measured]
 
 
 def test_in_another_thread_interrupts_that_are_raised_keep_the_stages_done(monkeypatch: pytest.MonkeyPatch) -> None:

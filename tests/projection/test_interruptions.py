@@ -11,7 +11,7 @@ from helpers import DOUBLE, wavy_grid
 from interruptions import WAYS, nth, press, stop
 from torch import Tensor
 
-from torchfair.projection import ElementTerm, GuidedProjection, IterationRecord, ProjectionResult, Status, run
+from torchfair.projection import ElementTerm, GuidedProjection, IterationRecord, ProjectionResult, Status, run, unbegun
 
 
 def stretched(x: Tensor) -> Tensor:
@@ -57,6 +57,27 @@ def test_interrupted_in_a_phase_state_and_history_are_of_one_step(
     assert result.status is Status.INTERRUPTED
     assert result.iterations == (0 if phase == "init" else n - 1)
     check(result, blocks["x"], solver.terms[0].stencil[0][1])
+
+
+@WAYS
+@pytest.mark.parametrize("after", [False, True])
+def test_a_large_start_is_not_evaluated_once_it_is_interrupted_and_says_so(
+    monkeypatch: pytest.MonkeyPatch, after: bool, act: Callable[[], None]
+) -> None:
+    solver, blocks = problem()
+    monkeypatch.setattr(unbegun, "_LARGE", blocks["x"].numel())
+    monkeypatch.setattr(run, "init", nth(run.init, 1, act, after=after))
+    result = solver.solve(blocks)
+    assert result.status is Status.INTERRUPTED
+    assert "not evaluated" in result.message
+    assert math.isnan(result.merit)
+    assert result.residuals == result.initial_residuals == []
+    assert torch.equal(result.blocks["x"], blocks["x"])
+    monkeypatch.setattr(unbegun, "_LARGE", blocks["x"].numel() + 1)
+    monkeypatch.setattr(run, "init", nth(run.init, 1, act, after=after))
+    smaller = solver.solve(blocks)
+    assert smaller.message == Status.INTERRUPTED.value
+    check(smaller, blocks["x"], solver.terms[0].stencil[0][1])
 
 
 @WAYS

@@ -15,7 +15,7 @@ from ...geometry import corner_angles, edge_lengths, face_areas, face_normals
 from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
 from ..job.promises import Promise, handle_promise
-from .panel_sizes import own_sizes
+from .panel_sizes import sizes_of
 from .panels import PLANAR_PROMISE
 from .problem import FairProblem
 
@@ -49,8 +49,10 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
     distances = problem.near.distances(normalised)[topology.valences > 0]
     back = problem.near.largest_distance_back(normalised, topology, like_start=problem.near_input)
     areas, lengths = face_areas(vertices, topology), edge_lengths(vertices, topology)
-    ratios, growth = areas / face_areas(start, topology), areas / own_sizes(start, topology)
-    turned = (face_normals(vertices, topology) * face_normals(start, topology)).sum(1)
+    normals, is_start = face_normals(vertices, topology), vertices is start
+    own_areas = areas if is_start else face_areas(start, topology)
+    ratios, growth = areas / own_areas, areas / sizes_of(own_areas)
+    turned = (normals * (normals if is_start else face_normals(start, topology))).sum(1)
     strayed = vertices.new_zeros(0) if problem.boundary is None else problem.boundary.distances(normalised)
     warps, sides = planarity(vertices, topology), problem.bounds.sides.shares(normalised, topology)
     energy, curvature = (

@@ -18,7 +18,11 @@ _TINY = 1e-30
 
 def own_sizes(vertices: Tensor, topology: Topology) -> Tensor:
     """(F,) areas of the faces of a mesh (V, 3), against which their growth is measured; half the mean at least."""
-    areas = face_areas(vertices, topology)
+    return sizes_of(face_areas(vertices, topology))
+
+
+def sizes_of(areas: Tensor) -> Tensor:
+    """(F,) areas, half of their mean at least."""
     return areas.clamp_min(_SMALL * float(areas.mean())) if areas.numel() else areas
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
+import torch
 from torch import Tensor
 
 from ...errors import SettingsError
@@ -145,6 +146,10 @@ class FairRecipe(Recipe[FairSettings]):
     def measures(self, vertices: Tensor) -> dict[str, float]:
         """See ``fair_measures``."""
         return fair_measures(vertices, self.given, self.problem, self.unit)
+
+    def after(self, vertices: Tensor, before: dict[str, float]) -> dict[str, float]:
+        """A start that was not moved has its own measures, and is not measured again."""
+        return dict(before) if torch.equal(vertices, self.given) else self.measures(vertices)
 
     def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
         """See ``fair_promises``."""

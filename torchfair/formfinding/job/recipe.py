@@ -221,6 +221,10 @@ class Recipe(ABC, Generic[S]):
         """Measures of what the job was given."""
         return self.measures(self.given)
 
+    def after(self, vertices: Tensor, before: dict[str, float]) -> dict[str, float]:
+        """Measures of a result (V, 3); those of the start are ``before``."""
+        return self.measures(vertices)
+
     def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
         """What was asked for and what was reached, from measures."""
         return []
@@ -228,7 +232,7 @@ class Recipe(ABC, Generic[S]):
     def level(self, state: State, before: dict[str, float], runs: list[ProjectionResult], like: Tensor) -> Level:
         """What is returned of a state, in the dtype and on the device of ``like``."""
         vertices = self.vertices(state)
-        after = self.measures(vertices)
+        after = self.after(vertices, before)
         promises = self.promises(before, after)
         return Level(vertices.to(like), self.topology, before, after, runs, promises)
 

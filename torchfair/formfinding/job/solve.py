@@ -35,10 +35,9 @@ def solved(
     done: list[Level] = []
     notes: list[str] = []
 
-    def begun() -> tuple[Session[Any], dict[str, float]]:
+    def begun() -> Session[Any]:
         with phase("preparing the mesh"):
-            session = Session(begin(), callback=callback, live=False)
-        return session, _before(session)
+            return Session(begin(), callback=callback, live=False)
 
     def finer(session: Session[Any]) -> tuple[Session[Any], dict[str, float], bool] | None:
         """The session on the next level, solved; None if it was interrupted before a step was taken."""
@@ -49,7 +48,8 @@ def solved(
         return None if interrupted_at_the_start(result.runs) else (result, before, ended)
 
     with deferred_interrupts() as interrupts:
-        session, before = interrupts.insist(begun)
+        session = interrupts.insist(begun)
+        before = interrupts.insist(_before, session)
         stopped = interrupts.insist(session.solve)
         for number in range(levels + 1):
             if number:
