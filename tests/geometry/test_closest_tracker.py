@@ -44,14 +44,30 @@ def test_a_tracker_with_more_equally_near_pieces_than_it_keeps():
         assert same(tracker.closest(points), surface.closest(points))
 
 
+def searched_by(tracker, monkeypatch):
+    """The numbers of points that are searched from now on."""
+    searched = []
+    anchor = tracker._tracker._anchor
+    monkeypatch.setattr(tracker._tracker, "_anchor", lambda rows, *rest: (searched.extend(rows), anchor(rows, *rest)))
+    return searched
+
+
+def test_points_that_start_near_the_surface_have_candidates_at_once(monkeypatch):
+    vertices, topology = wavy_grid(9, 11)
+    far = torch.tensor([[0.0, 0.0, 5.0]], dtype=DOUBLE)
+    tracker = ReferenceSurface(vertices, topology).tracker()
+    tracker.closest(torch.cat([vertices, far]))
+    searched = searched_by(tracker, monkeypatch)
+    tracker.closest(torch.cat([vertices, far]) + 1e-3)
+    assert searched == [len(vertices)]
+
+
 def test_a_tracker_searches_only_points_that_went_far(monkeypatch):
     vertices, topology = wavy_grid(9, 11)
     tracker = ReferenceSurface(vertices, topology).tracker()
     tracker.closest(vertices)
     tracker.closest(vertices)  # the points rest: now candidates are gathered
-    searched = []
-    anchor = tracker._tracker._anchor
-    monkeypatch.setattr(tracker._tracker, "_anchor", lambda rows, *rest: (searched.extend(rows), anchor(rows, *rest)))
+    searched = searched_by(tracker, monkeypatch)
     points = vertices + 1e-3
     points[17] += 3.0
     tracker.closest(points)
