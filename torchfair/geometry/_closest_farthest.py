@@ -15,6 +15,7 @@ from ._closest_search import BLOCK, measure, nearest_pieces
 from ._closest_triangles import Triangles
 
 _FIRST = 256  # points searched before all others
+_ROUNDING = 1e-12  # of distances from centres, relative to the coordinates
 
 
 def largest_distance(points: Tensor, vertices: Tensor, topology: Topology, owners: Tensor | None = None) -> float:
@@ -34,17 +35,31 @@ def largest_distance(points: Tensor, vertices: Tensor, topology: Topology, owner
         MeshError: a coordinate is not finite or beyond 1e70.
     """
     cut = cut_faces(to_columns(vertices, "vertices").T, topology)
-    shape, columns = Triangles(cut.points[cut.corners]), to_columns(points, "points")
+    corners, columns = cut.points[cut.corners], to_columns(points, "points")
+    shape = Triangles(corners)
     unbounded = np.full(columns.shape[1], np.inf)
     bounds = unbounded if owners is None else _bounds(shape, columns, cut, owners.cpu().numpy())
     order, reached, start = (-bounds).argsort(kind="stable"), 0.0, 0
     while start < order.size and bounds[order[start]] > reached:
         size = BLOCK if start or owners is None else _FIRST
         chosen = order[start : start + size]
-        chosen = columns[:, chosen[bounds[chosen] > reached]]
-        squared = shape.squared_distances(chosen, nearest_pieces(shape, chosen))
+        asked = columns[:, chosen[bounds[chosen] > reached]]
+        # A tree of all pieces takes longer than everything else where few points are searched.
+        near = shape if start or owners is None else _near(corners, asked, math.sqrt(bounds[order[0]]))
+        squared = near.squared_distances(asked, nearest_pieces(near, asked))
         reached, start = max(reached, float(squared.max())), start + size
     return math.sqrt(reached)
+
+
+def _near(corners: Floats, points: Floats, reach: float) -> Triangles:
+    """Those of the pieces (T, 3, 3) that are not farther than ``reach`` from all of some points (3, n), and others."""
+    from scipy.spatial import cKDTree
+
+    centres = corners.mean(1)
+    radii = np.sqrt(np.square(corners - centres[:, None]).sum(2).max(1))
+    slack = _ROUNDING * (np.abs(corners).max() + reach)
+    found = cKDTree(points.T).query(centres, distance_upper_bound=reach + radii.max() + 2 * slack)[0]
+    return Triangles(corners[found <= reach + radii + slack])
 
 
 def _bounds(shape: Triangles, points: Floats, cut: Pieces, owners: Ints) -> Floats:

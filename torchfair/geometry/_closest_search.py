@@ -24,9 +24,13 @@ class Shape(Protocol):
         longest: the largest of the extents.
     """
 
-    tree: BoxTree
     extents: Floats
     longest: float
+
+    @property
+    def tree(self) -> BoxTree:
+        """See above."""
+        ...
 
     def guess(self, points: Floats) -> Ints:
         """A piece near each of the points (d, N), not always the nearest."""

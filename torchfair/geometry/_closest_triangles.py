@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ._closest_boxes import BoxTree, Floats, Ints
 from ._closest_exact import unit_normals
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 TINY = 1e-290  # squared lengths below it are taken as zero
 
@@ -47,18 +51,14 @@ class Triangles:
                     0
 
     Edges are measured from their own start, so the distance at a corner is exactly 0. A triangle without
-    area is its three edges.
+    area is its three edges. What searches need is made when first asked for.
 
     Args:
         corners: (T, 3, 3) positions of the three corners, T > 0.
     """
 
     def __init__(self, corners: Floats) -> None:
-        from scipy.spatial import cKDTree  # here, because importing torchfair should stay cheap
-
-        self._centres = cKDTree(corners.mean(1), balanced_tree=False, compact_nodes=False)
         starts = np.ascontiguousarray(corners.transpose(2, 1, 0))  # axes: coordinate, corner, triangle
-        self.tree = BoxTree(starts.min(1), starts.max(1))
         edges = _edges(starts)
         squared = dot(edges, edges)
         normals = unit_normals(starts)
@@ -68,6 +68,24 @@ class Triangles:
         # An edge without length is its start: divided by infinity every point is at place 0.
         rows = (starts, np.where(squared > TINY, squared, np.inf), inward, normals)
         self._table = np.concatenate([row.reshape(-1, corners.shape[0]) for row in rows])
+
+    def prepare(self) -> Triangles:
+        """Makes now what the first search would make."""
+        _ = self.tree, self._centres
+        return self
+
+    @cached_property
+    def tree(self) -> BoxTree:
+        """Boxes of the triangles."""
+        starts = self._table[:9].reshape(3, 3, -1)
+        return BoxTree(starts.min(1), starts.max(1))
+
+    @cached_property
+    def _centres(self) -> cKDTree:
+        from scipy.spatial import cKDTree  # here, because importing torchfair should stay cheap
+
+        centres = self._table[:9].reshape(3, 3, -1).mean(1).T
+        return cKDTree(np.ascontiguousarray(centres), balanced_tree=False, compact_nodes=False)
 
     def guess(self, points: Floats) -> Ints:
         """The triangle with the nearest centre, for points (3, N); a far better first bound than boxes give."""

@@ -104,7 +104,7 @@ class ReferenceSurface:
         self.pieces = torch.from_numpy(cut.corners)
         self.piece_faces = torch.from_numpy(cut.faces)
         self._piece_faces = cut.faces
-        self._triangles = Triangles(cut.points[cut.corners])
+        self._triangles = Triangles(cut.points[cut.corners]).prepare()
         # Tables with the pieces in the last axis: (corner, coordinate, piece) and (coordinate, piece).
         corners = self._point_normals(topology)[self.pieces].numpy().transpose(1, 2, 0)
         flat = unit_normal(self.points[self.pieces]).numpy().T
