@@ -15,7 +15,7 @@ from .._numbers import check_count, check_number
 from ..errors import MeshError, SettingsError
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
-from ..geometry import FittedCurvature
+from ..geometry import FittedCurvature, ReferenceSurface
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
 from .attempt import PieceMesh
@@ -52,6 +52,11 @@ class ReadSurface:
     def whole(self) -> tuple[Tensor, Topology]:
         """Triangles of all components in order."""
         return _together([(part.vertices, part.topology) for part in self.parts])
+
+    @cached_property
+    def reference(self) -> ReferenceSurface:
+        """Triangles of all components, for closest points."""
+        return ReferenceSurface(*self.whole)
 
     def curved(self, points: Tensor) -> Tensor:
         """Points on the triangles, moved onto a smooth surface through their vertices, smooth but for creases."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import torch
 from torch import Tensor
 
@@ -11,12 +9,10 @@ from .._graph import edge_numbers
 from ..principal import PrincipalEdges
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
-from .components import on_surface, read_surface, spacing_of
-from .counts import mesh_to_count
-from .curvature_sizes import CurvatureSizes, curvature_sizes
-from .lattice import triangle_lattice
+from .components import read_surface, spacing_of
+from .lattice_rows import RowLattice
 from .report import measure
-from .row_distances import row_distance, row_sizes, rows_across
+from .row_distances import row_distance
 from .triangle_mesh import TriangleMesh
 from .verification import verified_topology
 
@@ -39,6 +35,9 @@ def principal_triangles(
     that are q apart have E per area ``|a| + |b| + 2 |a| p^2 / q^2``, so rows are laid farther apart than those of
     equilateral triangles where that brings E nearer to C: all by one ratio, or with ``settings.adaptive`` each by the
     curvatures in its place, with edges in proportion to ``1 / sqrt|k|`` for the larger one k.
+
+    Rows along the other curvature are taken where triangles would be turned over, as on the ends of long ellipsoids; a
+    note says so, and where triangles still are.
 
     Args:
         vertices: (V, 3) positions of the surface, any length unit.
@@ -65,23 +64,8 @@ def principal_triangles(
     chosen = settings or MeshingSettings()
     surface = read_surface(vertices, topology, chosen)
     ratio = row_distance(surface.frames, surface.directions)
-    lattices = [triangle_lattice(ratio)] * len(surface.parts)
     size = spacing_of(surface, ratio / 2, count, spacing)
-    across = rows_across(surface.frames, surface.directions)
-
-    def sizing(at: float) -> CurvatureSizes:
-        frames = surface.smooth_frames
-        sizes = curvature_sizes(frames, surface.directions, at, chosen.spacing_range, isotropic=True)
-        field = row_sizes(sizes.field, frames, surface.directions, across, ratio, at)
-        return CurvatureSizes(field, sizes.limited)
-
-    laid = replace(
-        surface,
-        fields=[of.turned for of in surface.fields] if across else surface.fields,
-        sizing=sizing if chosen.adaptive else None,
-    )
-    pieces, size = mesh_to_count(laid, lattices, size, chosen, count, lambda made: len(made.faces))
-    pieces = on_surface(pieces, surface, chosen)
+    pieces, size = RowLattice(surface, ratio, size, count, chosen).laid()
     positions = torch.from_numpy(pieces.positions)
     made = verified_topology(pieces.faces, len(positions), surface.shape)
     principal = PrincipalEdges(made, _mask(made, pieces.rows))

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from .._one_mesh import one_mesh
 from ..energies import NormalVariation
-from ..geometry import ReferenceSurface, corner_angles, edge_lengths, face_centres, planarity
+from ..geometry import corner_angles, edge_lengths, face_centres, planarity
 from ..topology import Topology
 from .components import ReadSurface
 from .curvature_sizes import ASKED
@@ -41,7 +41,7 @@ def measure(
         creases: of the mesh.
         chosen: (I,) bool: the inner edges that are to follow directions, all by default.
     """
-    reference = ReferenceSurface(*surface.whole)
+    reference = surface.reference
     frames, directions = surface.frames, surface.directions
     angles = np.degrees(angles_to_directions(vertices, topology, reference, frames, directions, spacing, chosen))
     sizes = topology.face_sizes
