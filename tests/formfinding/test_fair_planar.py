@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import pytest
 import torch
@@ -12,9 +13,12 @@ from honeycombs import honeycomb
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.formfinding import FairSettings, minimise_normal_variation
+from torchfair.formfinding import FairRecipe, FairSettings, minimise_normal_variation
+from torchfair.formfinding.fair.problem import FairProblem
+from torchfair.formfinding.job.plan import Stage
 from torchfair.geometry import corner_angles
 from torchfair.geometry.planarity import planarity
+from torchfair.projection.layout import State
 
 
 def quad(warp: float) -> tuple[Tensor, Topology]:
@@ -53,6 +57,42 @@ def test_what_cannot_become_planar_is_named_and_left_as_it_was() -> None:
     (note,) = (note for note in result.notes if "NOT REACHED" in note)
     assert "planarity of kept faces 0.139" in note
     assert "1 of 1: faces 0 (0.14)" in note
+
+
+def test_weights_that_cannot_make_faces_planar_are_not_raised_further(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within the limit none can: after the whole weight they are made planar beyond it, and E is lowered there."""
+    shares, planar, settings = [], [], FairSettings(planar="quads", continuation=())
+    stage, planar_stage = FairProblem.stage, FairProblem.planar_stage
+
+    def noted(problem: FairProblem, state: State, share: float, *others: Any) -> Stage:
+        shares.append(share)
+        return stage(problem, state, share, *others)
+
+    def noted_planar(problem: FairProblem, state: State, share: float) -> Stage:
+        planar.append(len(shares))
+        return planar_stage(problem, state, share)
+
+    monkeypatch.setattr(FairProblem, "stage", noted)
+    monkeypatch.setattr(FairProblem, "planar_stage", noted_planar)
+    result = minimise_normal_variation(*quad(0.4), settings=settings)
+    assert result.holds
+    assert planar[0] == 8
+    assert shares[:8] == pytest.approx([(number + 1) / 8 for number in range(8)])
+
+
+def test_vertices_off_the_surface_have_room_while_e_is_lowered() -> None:
+    """A quarter of their distance, but no more than the farthest; the limit where they are within it."""
+    vertices, topology = quad(0.0)
+    recipe = FairRecipe(vertices, topology, settings=FairSettings(planar="quads", distance_limit=0.05))
+    near, lifted = recipe.problem.near, recipe.start.clone()
+    lifted[:, 2] += torch.tensor([0.01, 0.1, 0.15, 0.16], dtype=DOUBLE)
+    near.lift(lifted, room=1.25)
+    assert near.allowed is not None
+    assert near.allowed.tolist() == pytest.approx([0.05, 0.125, 0.16, 0.16])
+    near.lift(lifted)
+    assert near.allowed.tolist() == pytest.approx([0.05, 0.1, 0.15, 0.16])
+    near.lift(lifted, 0.155)
+    assert near.allowed.tolist() == pytest.approx([0.155, 0.155, 0.155, 0.16])
 
 
 @pytest.mark.slow

@@ -45,6 +45,18 @@ def test_faces_that_became_less_planar_are_not_planar_enough() -> None:
     assert not panels.are_planar(warped(0.012))
 
 
+def test_weights_make_faces_planar_that_are_as_near_as_they_rise() -> None:
+    """A share of a sixth is a power of ten of the weight; a stage that has not come to rest may be ten times behind."""
+    panels = Panels(bent(0.0), QUADS, FairSettings(planar="quads"), [])
+    for share, largest in ((0.0, 5e-4), (1 / 6, 5e-3), (2 / 6, 5e-2)):
+        for factor, may in ((0.9, True), (1.1, False)):
+            vertices = warped(0.01)
+            vertices[5, 2] *= factor * largest / float(panels.warps(vertices).max())
+            assert float(panels.warps(vertices).max()) == pytest.approx(factor * largest, rel=0.01)
+            assert panels.may_become_planar(vertices, share) is may
+    assert Panels(bent(0.0), QUADS, FairSettings(planar="keep"), []).may_become_planar(warped(1.0), 0.0)
+
+
 def test_small_faces_may_grow_as_those_of_half_the_mean_area() -> None:
     topology = Topology.from_faces([[0, 1, 2], [0, 2, 3]])
     vertices = torch.tensor([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [1.9, 2, 0]], dtype=DOUBLE)

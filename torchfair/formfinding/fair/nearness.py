@@ -120,11 +120,15 @@ class Nearness:
         self.allowed = lifted if bool((lifted > self.limits).any()) else self.limits
         self._pulls.version += 1
 
-    def lift(self, vertices: Tensor, most: float = 0.0) -> None:
-        """Lifts limits to where the ``vertices`` (V, 3) are, and to ``most`` mean edges of the input; never below."""
+    def lift(self, vertices: Tensor, most: float = 0.0, *, room: float = 1.0) -> None:
+        """Lifts limits to where the ``vertices`` (V, 3) are, and to ``most`` mean edges of the input; never below.
+
+        With ``room`` above 1 to so many times their distances, but not beyond the farthest of them.
+        """
         if self.limits is None or self.design_mode:
             return
-        lifted = (self.distances(vertices) * _ROUNDING).clamp_min(most * self._input_edge)
+        distances = self.distances(vertices) * _ROUNDING
+        lifted = (room * distances).minimum(distances.max()).clamp_min(most * self._input_edge)
         self.allowed = torch.maximum(self.limits, lifted)
         self._pulls.version += 1
 

@@ -18,6 +18,7 @@ from .planar_faces import NearlyPlanar, faces_to_keep_planar
 
 PLANAR_PROMISE = 1e-4  # relative planarity of faces that are kept planar
 _PLANAR_ENOUGH = 5e-5
+_BEHIND = 10.0  # times the deviation that a weight leads to: what a stage may leave that has not come to rest
 _LARGEST_WARP = 1e-2  # relative planarity above which planarity is imposed in stages
 _LARGEST_FOLD = math.radians(2.0)  # of edges kept flat, above which that is imposed in stages
 _FLAT_ENOUGH = math.radians(0.01)
@@ -118,6 +119,15 @@ class Panels:
         if bool((self.nearly.growth(warps) > _PLANAR_ENOUGH).any()):
             return False
         return not settings.flat_weight or not bool((self.folds(vertices) > _FLAT_ENOUGH).any())
+
+    def may_become_planar(self, vertices: Tensor, share: float) -> bool:
+        """Whether the faces of a mesh (V, 3) are planar enough for weights to make them planar that rise by a share.
+
+        Where faces can become planar, their deviation falls as the weight rises, since what pulls at them stays as
+        strong. Where they cannot, it does not fall.
+        """
+        heavier = _raised(self.settings.planarity_weight, share)
+        return not self.makes_planar or bool((self.warps(vertices) <= _BEHIND * heavier * _PLANAR_ENOUGH).all())
 
     def come_in_stages(self, vertices: Tensor) -> bool:
         """Whether a mesh (V, 3) is too far from that for weights that are full at once."""

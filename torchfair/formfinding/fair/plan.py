@@ -14,9 +14,11 @@ from .problem import FairProblem
 
 _SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
 _LARGEST_SHARE = 1.3
+_HEAVIEST = 1.0 + 2.0 * _SHARE_STEP  # the share that this leads to
 _WEAK = 1.0 / 3.0
 _LITTLE_MORE = 1.02  # times E of the start: what planar faces cost on a mesh that had hardly more than the least
 _WORTHWHILE = 0.1  # of the largest deviation from planarity at the start: less is better than nothing
+_ROOM = 1.25  # times the distance of planar faces: on their limits, vertices would have nowhere to go
 _PLANAR_SHARES = (1.0 / 3.0, 2.0 / 3.0, 1.0, 7.0 / 6.0, 8.0 / 6.0)  # that make faces planar without E
 
 
@@ -93,7 +95,7 @@ class FairPlan(Plan):
         return asked and problem.is_planar_within_limits(start)
 
     def _lowered(self, portions: list[Portion], start: Tensor, most: float) -> Stages:
-        """The portions, and planarity once more where the last one was not enough."""
+        """The portions, and planarity once more where the last one was not enough; none that cannot make it enough."""
         problem = self._problem
         while portions:
             share, blur = portions.pop(0)
@@ -101,7 +103,10 @@ class FairPlan(Plan):
             settings = problem.settings.stage() if portions else problem.settings.projection
             yield problem.stage(self.state, share, blur, settings)
             self.state = problem.blocks(self.state["vertices"])
-            if not portions and share < most and not problem.panels.are_planar(problem.placed(self.state)):
+            placed = problem.placed(self.state)
+            if share >= 1.0 and most > 1.0 and not problem.panels.may_become_planar(placed, _HEAVIEST - share):
+                return
+            if not portions and share < most and not problem.panels.are_planar(placed):
                 portions.append(Portion(share + _SHARE_STEP, 1.0))
 
     def _made_planar(self, start: Tensor, most: float) -> Stages:
@@ -119,7 +124,7 @@ class FairPlan(Plan):
         planar = self.state["vertices"]
         if problem.largest_warp(planar) > PLANAR_PROMISE:
             return
-        problem.near.lift(planar)
+        problem.near.lift(planar, room=_ROOM)
         yield from self._lowered([Portion(1.0, 1.0)], planar, _LARGEST_SHARE)
         lowered = self.state["vertices"]
         if problem.largest_warp(lowered) > PLANAR_PROMISE or problem.energy(lowered) > problem.energy(planar):
