@@ -70,12 +70,13 @@ def test_one_solve_where_edges_keep_their_directions(saddle, asked):
     assert not any("turn edges" in note for note in made.notes)
 
 
-def test_where_edges_turn_too_far_e_counts_less_and_what_is_left_is_said(saddle, asked, monkeypatch):
+def test_where_edges_turn_too_far_directions_count_more_and_what_is_left_is_said(saddle, asked, monkeypatch):
     surface, mesh = saddle
     once, _ = planar_quads(mesh, surface)
     monkeypatch.setattr(MODULE, "_TURNED", -1.0)  # whatever they turn is too far
     twice, job = planar_quads(mesh, surface)
-    assert [of.energy_weight for of in asked] == [10, 10, 1]
+    assert asked[:2] == [PLANAR_QUADS, PLANAR_QUADS]
+    assert asked[2:] == [replace(PLANAR_QUADS, direction_weight=3000.0)]
     assert job.holds
     assert twice.report["planarity_max"] < 1e-4
     assert turned(twice) <= turned(once)

@@ -35,7 +35,7 @@ Panels grow by half at most: since edges of the boundary have no E, panels there
 """
 
 _TURNED = 1.0  # degrees in the mean, beyond which edges turn too far
-_GENTLER = replace(PLANAR_QUADS, energy_weight=1.0)
+_STIFFER = replace(PLANAR_QUADS, direction_weight=3000.0)
 
 
 def planar_quads(
@@ -44,8 +44,8 @@ def planar_quads(
     """A principal mesh with planar polygons near the surface that it was made from.
 
     Lowers E under ``PLANAR_QUADS``; what `torchfair mesh --planar` does. Where that turns edges away from principal
-    directions by more than 1 degree in the mean, it is done once more with E counting a tenth, from the same start, and
-    what turns them less is taken.
+    directions by more than 1 degree in the mean, it is done once more with directions counting ten times, from the same
+    start, and what turns them less is taken.
 
     Args:
         mesh: from :func:`torchfair.meshing.principal_quads`.
@@ -80,7 +80,7 @@ def planar_quads(
 
     job, report = solved(PLANAR_QUADS)
     if _turn(report) > _TURNED and not job.stopped:
-        other = solved(_GENTLER)
+        other = solved(_STIFFER)
         if _is_as_good(other[0], job) and _turn(other[1]) < _turn(report):
             job, report = other
         elif other[0].stopped:
