@@ -12,7 +12,7 @@ from torchfair.geometry import face_centres, face_normals
 from torchfair.meshing import MeshingSettings, TriangleMesh, lattice_rows, principal_triangles
 from torchfair.meshing.components import Pieces, read_surface
 from torchfair.meshing.mesh_creases import MeshCreases
-from torchfair.meshing.three_valent import between
+from torchfair.meshing.three_valent import between, with_three_valent_inside
 from torchfair.meshing.turned_over import turned_over
 from torchfair.shapes import icosphere
 
@@ -84,6 +84,22 @@ def test_three_valent_vertices_lie_between_their_neighbours(monkeypatch: pytest.
     assert turned(alone, HALF_LONG) == 4
     assert torch.equal(alone.vertices[~at], found.vertices[~at])
     assert any("4 triangles are turned over, one at" in note for note in alone.notes)
+
+
+def test_three_valent_vertices_on_creases_stay() -> None:
+    """One of two that lie off their triangles, at the tops of two flat pyramids."""
+    base = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    positions = torch.tensor(
+        [*base, [0.9, 0.05, 0.01], *([x + 4, y, z] for x, y, z in base), [4.9, 0.05, 0.01]], dtype=torch.float64
+    )
+    faces = [[a + k, b + k, 3 + k] for k in (0, 4) for a, b in ((0, 1), (1, 2), (2, 0))]
+    surface = read_surface(*ellipsoid(HALF_LONG), MeshingSettings())
+    creases = MeshCreases(torch.tensor([[0, 3], [1, 3]]), torch.zeros(0, 2, 3))
+    rows = {(0, 3), (4, 7)}
+    none = torch.zeros(0)
+    pieces = Pieces(positions.numpy(), faces, rows, creases, torch.zeros(0, 3).double(), none, [], [0], None)
+    moved = torch.from_numpy(with_three_valent_inside(pieces, surface).positions) != positions
+    assert moved.any(1).tolist() == [False] * 7 + [True]
 
 
 def test_rows_follow_the_other_curvature_where_triangles_would_be_turned_over() -> None:
