@@ -74,6 +74,8 @@ def test_what_follows_a_computation_is_followed() -> None:
         note(MANY)
     with torch.device("cpu"):
         note(MANY)
+    with torch.autocast("cpu", torch.bfloat16):
+        note(MANY)
     assert seen
     assert all(threads == alone for threads in seen)
     with torch.no_grad():

@@ -48,8 +48,10 @@ def side_by_side(function: Callable[[Item], Result], items: Sequence[Item], vert
     try:
         return list(pool.map(of_one, items))
     finally:
-        pool.shutdown(cancel_futures=True)
-        torch.set_num_threads(before)
+        try:
+            pool.shutdown(cancel_futures=True)
+        finally:  # of a second interrupt, too
+            torch.set_num_threads(before)
 
 
 def _is_followed(vertices: Tensor) -> bool:
@@ -58,5 +60,6 @@ def _is_followed(vertices: Tensor) -> bool:
         or is_transformed()
         or is_recorded()
         or torch._C._len_torch_function_stack() > 0
+        or torch.is_autocast_enabled("cpu")
         or torch.autograd.forward_ad._current_level >= 0
     )

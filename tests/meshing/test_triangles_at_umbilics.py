@@ -117,6 +117,15 @@ def test_rows_follow_the_other_curvature_where_triangles_would_be_turned_over() 
     assert "turned over, one at (" in kept.notes[-1]
 
 
+def test_the_note_counts_triangles_of_the_mesh_that_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where rows along the other curvature turn over more."""
+    numbers = [[0, 1], [2, 3, 4]]
+    monkeypatch.setattr(lattice_rows, "turned_over", lambda *_: torch.tensor(numbers.pop(0) if numbers else [0, 1]))
+    found = principal_triangles(*ellipsoid(HALF_LONG), count=200)
+    assert "2 triangles are turned over, one at (" in found.notes[-1]
+    assert not any("rows follow" in note for note in found.notes)
+
+
 def test_faces_that_look_inward_are_turned_over() -> None:
     vertices, topology = ellipsoid(HALF_LONG)
     surface = read_surface(vertices, topology, MeshingSettings())

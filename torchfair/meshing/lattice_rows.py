@@ -55,7 +55,7 @@ class RowLattice:
             except NoMeshError:
                 pass
             else:
-                left = len(turned_over(others, self.surface))
+                left = min(over, len(turned_over(others, self.surface)))
         names = ("smaller", "larger") if across else ("larger", "smaller")
         notes = []
         if left < over:

@@ -128,7 +128,7 @@ class Nearness:
         if self.limits is None or self.design_mode:
             return
         distances = self.distances(vertices) * _ROUNDING
-        lifted = (room * distances).minimum(distances.max()).clamp_min(most * self._input_edge)
+        lifted = (room * distances).minimum(distances[self._used].max()).clamp_min(most * self._input_edge)
         self.allowed = torch.maximum(self.limits, lifted)
         self._pulls.version += 1
 
