@@ -91,6 +91,16 @@ def test_vertices_off_the_surface_have_room_while_e_is_lowered() -> None:
     assert near.allowed.tolist() == pytest.approx([0.05, 0.125, 0.16, 0.16])
     near.lift(lifted)
     assert near.allowed.tolist() == pytest.approx([0.05, 0.1, 0.15, 0.16])
+    # An isolated vertex is not among those that are far.
+    lone = FairRecipe(
+        torch.cat([vertices, torch.full((1, 3), 9.0, dtype=DOUBLE)]),
+        Topology.from_faces(topology.face_lists(), num_vertices=5),
+        settings=FairSettings(planar="quads", distance_limit=0.05),
+    )
+    apart = torch.cat([lifted, torch.full((1, 3), 9.0, dtype=DOUBLE)])
+    lone.problem.near.lift(apart, room=1.25)
+    assert lone.problem.near.allowed is not None
+    assert lone.problem.near.allowed[:4].tolist() == pytest.approx([0.05, 0.125, 0.16, 0.16])
     near.lift(lifted, 0.155)
     assert near.allowed.tolist() == pytest.approx([0.155, 0.155, 0.155, 0.16])
 
