@@ -161,6 +161,20 @@ def test_noise_inside_and_at_the_boundary(name, level, kind) -> None:
         assert turned[clear & edge].median() < 3 * inside
 
 
+@pytest.mark.parametrize("name", ["saddle", "cylinder"])
+def test_wide_patches_near_the_boundary_mend_what_noise_does_there(name: str) -> None:
+    """Errors of directions at the boundary against those over narrow patches, and no other fits away from it."""
+    mesh = irregular_triangles(SURFACES[name], 1500)
+    vertices = torch.stack([noisy(mesh, 0.1, "normal", seed) for seed in (1, 2)])
+    patches, narrow = Patches(mesh.topology, 4), Patches(mesh.topology, 4)
+    narrow.wide, narrow.wide_places = narrow.groups, narrow.places
+    fits = [fitted_curvature(vertices, mesh.topology, rings=of) for of in (patches, narrow)]
+    turned, before = (angles(fit.directions, mesh.principal_directions) for fit in fits)
+    edge = distinct(mesh) & mesh.topology.is_boundary_vertex
+    assert turned[:, edge].median() < 0.85 * before[:, edge].median()
+    torch.testing.assert_close(turned[:, ~patches.border], before[:, ~patches.border])
+
+
 def test_directions_converge_and_curvatures_with_nearly_the_third_order() -> None:
     sizes, turned, curved = [], [], []
     for count in (300, 1200, 4800):

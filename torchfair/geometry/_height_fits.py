@@ -14,6 +14,7 @@ from ._ops import gather
 from .patches import Patches, PatchGroup
 from .tangent_basis import tangent_bases
 
+_FALL = 1.5  # of doubts with the unit, times the order; 2 if no orders were left out
 _RIDGE = 1e-13  # keeps what the members leave open at zero, higher orders first
 _POOLING = 2  # times over patches
 _ROUNDING = 1e-12  # of mean squares
@@ -83,6 +84,10 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     be spread about zero as widely as they are found to be in the patches around, less what noise alone makes of them
     (empirical Bayes). Without noise that is the plain fit; in noise it is a quadratic one, with as much of a slope of
     the curvatures as can be told. ``degree`` is 3 or more.
+
+    The last fit is over the wide patches near the boundary: of one side alone second derivatives are less certain.
+    There the noise of a coefficient of order k, over the coefficient, falls with the power 2 k of the unit. Orders that
+    are left out count the more; by the power 1.5 k doubts fall less, which has been found to be right.
     """
     frames, least = _frames(normals), _least(degree, normals.device)
     # Matrices of all vertices would take kilobytes for each, so they are made for one group of patches at a time, and
@@ -101,21 +106,25 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     scale = patches.in_order([fit.scale for fit in fits]).squeeze(-1)
     fits.clear()
     variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
+    powers = doubts.new_tensor([_FALL * order for order, _ in terms(degree)[:-_NEEDED]])
 
-    def believed_fit(number: int) -> tuple[Tensor, Tensor]:
-        group, found = patches.groups[number], kept.pop(number, None)
+    def believed_fit(number: int) -> tuple[Tensor, Tensor, Tensor]:
+        group, found = patches.wide[number], kept.pop(number, None)
         members = members_of(vertices, normals, frames, group) if found is None else found
-        own = gather(doubts, group.centres), gather(variance[..., None], group.centres).squeeze(-1)
-        return _believed_fit(members, least, *own, degree)
+        own, noise, before = (gather(x, group.centres) for x in (doubts, variance[..., None], scale[..., None]))
+        size = before / members.scale[..., None]  # one, but for wide patches
+        own, noise = own * size**powers, (noise * size.square()).squeeze(-1)
+        return *_believed_fit(members, least, own, noise, degree), members.scale[..., None]
 
-    believed = side_by_side(believed_fit, range(len(patches.groups)), vertices)
-    coefficients, uncertainty = (patches.in_order([fit[i] for fit in believed]) for i in range(2))
-    return Heights(frames, scale, coefficients, uncertainty.squeeze(-1))
+    believed = side_by_side(believed_fit, range(len(patches.wide)), vertices)
+    coefficients, uncertainty, scale = (patches.in_order([fit[i] for fit in believed], wide=True) for i in range(3))
+    return Heights(frames, scale.squeeze(-1), coefficients, uncertainty.squeeze(-1))
 
 
 def _last_kept(vertices: Tensor, patches: Patches) -> int:
-    """How many of the first groups have members that may all be kept."""
-    sizes = [group.members.numel() * NUMBERS_OF_MEMBER for group in patches.groups]
+    """How many of the first groups have members that may all be kept: of those that are needed once more."""
+    shared = (group for group, wide in zip(patches.groups, patches.wide, strict=False) if group is wide)
+    sizes = [group.members.numel() * NUMBERS_OF_MEMBER for group in shared]
     room = _KEPT // max(1, vertices.shape[:-2].numel())
     return sum(total <= room for total in itertools.accumulate(sizes))
 

@@ -110,7 +110,7 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
     vertices within some rings of edges (osculating jets: Cazals and Pouget, *Estimating differential quantities using
     polynomial fitting of osculating jets*, 2005). The plane is that of a quadratic fit before. Terms of the third
     and fourth degree are weighed by how far they stand out of the noise of the mesh: they follow curvatures that
-    change, up to the boundary, and do not follow the noise.
+    change, up to the boundary, and do not follow the noise. From three rings on, patches near the boundary are wider.
 
     Without noise the error of operators is nearly of the third order in the edge length, on irregular meshes too.
     Creases are rounded over the rings.
@@ -191,13 +191,17 @@ def _fitted_by_noise(vertices: Tensor, topology: Topology) -> FittedCurvature:
         return fit
     wanted = (_LEAST_RINGS + 0.5) * float((least / _WANTED) ** (1 / 3)) - 0.5
     rings = min(max(math.ceil(wanted), _LEAST_RINGS + 1), _MOST_RINGS)
-    wider = fitted_curvature(vertices, topology, rings=rings)
-    return wider if _relative_doubt(wider) < least else fit
+    patches = Patches(topology, rings)
+    wider = fitted_curvature(vertices, topology, rings=patches)
+    inner = ~patches.border if not bool(patches.border.all()) else None  # wide patches are always less uncertain
+    return wider if _relative_doubt(wider, inner) < _relative_doubt(fit, inner) else fit
 
 
-def _relative_doubt(fit: FittedCurvature) -> float:
+def _relative_doubt(fit: FittedCurvature, where: Tensor | None = None) -> float:
+    """Median of the doubts over the size of the operators, at the vertices ``where`` (V,)."""
     size = norm(fit.operators.detach().flatten(-2)) + _FLAT / fit.scales.detach()
-    ratios = (fit.doubts.detach() / size).flatten()
+    ratios = fit.doubts.detach() / size
+    ratios = (ratios if where is None else ratios[..., where]).flatten()
     try:
         return float(ratios.median()) if ratios.numel() else 0.0
     except RuntimeError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor
 
@@ -16,7 +17,11 @@ from ._ops import gather
 if TYPE_CHECKING:
     import scipy.sparse as sp
 
+Ints = npt.NDArray[np.int64]
+
 _FEW, _ENOUGH = 0.8, 1.25  # of the vertices that the rings of a triangular lattice have
+_NOISY, _WIDE = 3, 3.0  # rings from which on there are wide patches; their vertices over those of the lattice
+_SHARE = 0.1  # of the vertices of a connected part, as many as wide patches want at most
 _PAIRS = 1 << 15  # of a vertex and a member at once: what is made of them stays near the cache
 
 
@@ -42,6 +47,11 @@ class Patches:
     most as many again: at the boundary, where one side is missing and fits are less certain. Build patches once for
     a topology; they hold no positions.
 
+    From three rings on, vertices that are fewer rings from the boundary have wide patches, too: of three times as many
+    vertices as the lattice at the boundary, evenly less further inside, and at most three times as many rings. They
+    want no more than a tenth of the vertices of a connected part, as polynomials do not follow shapes of that size, and
+    parts have none where narrow patches are as large.
+
     Args:
         topology: any polygon mesh.
         rings: 1 or more.
@@ -51,15 +61,32 @@ class Patches:
 
     Attributes:
         rings: as asked for.
-        groups: all patches, small ones first.
+        groups: all patches, those without wide ones first, and small ones before larger ones in both.
         places: (V,) of each vertex in the groups one after the other.
+        wide: the groups again, with wide patches in place of narrow ones; those without are the same objects.
+        wide_places: (V,) of each vertex in them.
+        border: (V,) whether there is a wide patch of the vertex.
     """
 
     def __init__(self, topology: Topology, rings: int) -> None:
         check_count("rings", rings, least=1)
         self.rings = int(rings)
         with torch._C._DisableFuncTorch():  # inside function transforms index tensors have no numbers to read
-            self.groups, self.places = _grouped(_within(topology, self.rings), topology.device)
+            step = _step(topology)
+            exact = _within(step, self.rings)
+            lattice = 1 + 3 * self.rings * (self.rings + 1)
+            counts = np.diff(exact.indptr)
+            few = np.flatnonzero(counts < _FEW * lattice)
+            grown = _grown(exact[few], step, np.full(len(few), _ENOUGH * lattice), self.rings)
+            border, wanted = _border(topology, step, self.rings)
+            wide = _grown(exact[border], step, wanted, 2 * self.rings)
+            whole = _replaced(exact, few, grown)
+            inner = np.setdiff1d(np.arange(len(counts)), border)
+            shared = _grouped(whole[inner], inner, topology.device)
+            self.groups = [*shared, *_grouped(whole[border], border, topology.device)]
+            self.wide = [*shared, *_grouped(wide, border, topology.device)]
+            self.places, self.wide_places = _places(self.groups), _places(self.wide)
+            self.border = torch.from_numpy(np.isin(np.arange(len(counts)), border)).to(topology.device)
 
     def means(self, values: Tensor) -> Tensor:
         """Means of the values (*batch, V, d) of the members: (*batch, V, d)."""
@@ -75,12 +102,13 @@ class Patches:
         """(V,) numbers of members."""
         return torch.cat([present.sum(1) for _, _, present in self.groups]).index_select(0, self.places)
 
-    def in_order(self, parts: list[Tensor]) -> Tensor:
-        """Values (*batch, n, d) of the groups as values (*batch, V, d) of the vertices."""
-        return torch.cat(parts, dim=-2).index_select(-2, self.places)
+    def in_order(self, parts: list[Tensor], *, wide: bool = False) -> Tensor:
+        """Values (*batch, n, d) of the groups, or of the wide ones, as values (*batch, V, d) of the vertices."""
+        return torch.cat(parts, dim=-2).index_select(-2, self.wide_places if wide else self.places)
 
 
-def _grouped(around: sp.csr_array, device: torch.device) -> tuple[list[PatchGroup], Tensor]:
+def _grouped(around: sp.csr_array, centres: Ints, device: torch.device) -> list[PatchGroup]:
+    """Groups of the rows of (n, V), which are patches of the vertices ``centres`` (n,)."""
     counts = np.diff(around.indptr)
     order = np.argsort(counts, kind="stable")
     groups: list[PatchGroup] = []
@@ -88,36 +116,81 @@ def _grouped(around: sp.csr_array, device: torch.device) -> tuple[list[PatchGrou
     while low < len(order):
         sizes = counts[order[low:]] * np.arange(1, len(order) - low + 1)
         high = low + max(int(np.searchsorted(sizes, _PAIRS, side="right")), 1)
-        centres = order[low:high]
-        columns = np.arange(counts[centres].max())
-        present = columns < counts[centres, None]
-        places = around.indptr[centres, None] + np.where(present, columns, 0)
-        members = np.where(present, around.indices[places], centres[:, None]).astype(np.int64)
-        groups.append(PatchGroup(*(torch.from_numpy(array).to(device) for array in (centres, members, present))))
+        rows = order[low:high]
+        columns = np.arange(counts[rows].max())
+        present = columns < counts[rows, None]
+        places = around.indptr[rows, None] + np.where(present, columns, 0)
+        members = np.where(present, around.indices[places], centres[rows, None]).astype(np.int64)
+        groups.append(PatchGroup(*(torch.from_numpy(array).to(device) for array in (centres[rows], members, present))))
         low = high
-    return groups, torch.from_numpy(np.argsort(order, kind="stable")).to(device)
+    return groups
 
 
-def _within(topology: Topology, rings: int) -> sp.csr_array:
-    """(V, V) SciPy matrix, with an entry where the column is a member of the patch of the row."""
-    from scipy.sparse import csr_array, eye_array, vstack
+def _places(groups: list[PatchGroup]) -> Tensor:
+    """(V,) of each vertex in the groups one after the other."""
+    return torch.argsort(torch.cat([group.centres for group in groups])) if groups else torch.zeros(0).long()
+
+
+def _step(topology: Topology) -> sp.csr_array:
+    """(V, V) SciPy matrix, with an entry where a face has both vertices or they are the same."""
+    from scipy.sparse import csr_array, eye_array
 
     count = topology.num_vertices
     corners, faces = topology.corners.cpu().numpy(), topology.corner_faces.cpu().numpy()
     shares = csr_array((np.ones(len(corners), bool), (corners, faces)), shape=(count, topology.num_faces))
-    step = (shares @ shares.T + eye_array(count, dtype=bool)).tocsr()
+    step: sp.csr_array = (shares @ shares.T + eye_array(count, dtype=bool)).tocsr()
+    return step
+
+
+def _within(step: sp.csr_array, rings: int) -> sp.csr_array:
+    """(V, V), with an entry where the column is within so many rings of the row."""
     reached = step
     for _ in range(rings - 1):
         reached = reached @ step
-    lattice = 1 + 3 * rings * (rings + 1)
-    small = np.diff(reached.indptr) < _FEW * lattice
-    numbers, parts, rows = [np.flatnonzero(~small)], [reached[~small]], np.flatnonzero(small)
-    reached = reached[small]
-    for more in range(rings):
+    return reached
+
+
+def _grown(reached: sp.csr_array, step: sp.csr_array, wanted: npt.NDArray[np.float64], most: int) -> sp.csr_array:
+    """(n, V) rows with one more ring, and more until they have as many entries as ``wanted`` (n,), at most ``most``."""
+    from scipy.sparse import vstack
+
+    numbers, parts, rows = [], [reached[:0]], np.arange(len(wanted))
+    for more in range(most):
         reached = reached @ step
-        done = (np.diff(reached.indptr) >= _ENOUGH * lattice) | (more == rings - 1)
+        done = (np.diff(reached.indptr) >= wanted[rows]) | (more == most - 1)
         numbers.append(rows[done])
         parts.append(reached[done])
         reached, rows = reached[~done], rows[~done]
+        if not len(rows):
+            break
     whole: sp.csr_array = vstack(parts, format="csr")[np.argsort(np.concatenate(numbers))]
     return whole
+
+
+def _replaced(matrix: sp.csr_array, rows: Ints, by: sp.csr_array) -> sp.csr_array:
+    """The matrix with other ``rows`` (n,), those of ``by`` (n, V)."""
+    from scipy.sparse import vstack
+
+    others = np.setdiff1d(np.arange(matrix.shape[0]), rows)
+    whole: sp.csr_array = vstack([matrix[others], by], format="csr")[np.argsort(np.concatenate([others, rows]))]
+    return whole
+
+
+def _border(topology: Topology, step: sp.csr_array, rings: int) -> tuple[Ints, npt.NDArray[np.float64]]:
+    """Vertices (n,) with wide patches, and how many vertices these are to have (n,)."""
+    from scipy.sparse.csgraph import connected_components
+
+    if rings < _NOISY:
+        return np.zeros(0, np.int64), np.zeros(0)
+    near = topology.is_boundary_vertex.cpu().numpy()
+    distance = np.where(near, 0, rings)
+    for ring in range(1, rings):
+        wider = step @ near
+        distance[wider & ~near] = ring
+        near = wider
+    parts = connected_components(step, directed=False)[1]
+    most = _SHARE * np.bincount(parts)[parts]
+    lattice = 1 + 3 * rings * (rings + 1)
+    vertices = np.flatnonzero((distance < rings) & (most > _ENOUGH * lattice))
+    wanted = (_WIDE - (_WIDE - 1.0) * distance[vertices] / rings) * lattice
+    return vertices, np.minimum(wanted, most[vertices])
