@@ -7,7 +7,7 @@ import torch
 from helpers import wavy_grid
 
 from torchfair.energies import normal_variation, normal_variation_per_edge
-from torchfair.formfinding import FairSettings, minimise_normal_variation
+from torchfair.formfinding import FairRecipe, FairSettings, minimise_normal_variation
 from torchfair.formfinding.fair import scales as of_fairness
 from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.formfinding.job.pulls import Pulls
@@ -81,6 +81,17 @@ def test_blunt_stages_of_large_meshes_are_no_blunter_than_a_quarter_of_the_mean(
     assert smoothing(1.0) == sharp
     monkeypatch.setattr(of_fairness, "_BLUNT", 1e-9)
     assert smoothing(10.0) == sharp
+
+
+def test_blunt_stages_of_large_meshes_end_after_two_steps_that_gain_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    def patience() -> list[int]:
+        mesh = icosphere(2)
+        recipe = FairRecipe(mesh.vertices, mesh.topology)
+        return [stage.settings.patience for stage in recipe.plan(recipe.state()).stages()]
+
+    assert patience() == [6, 6, 6]
+    monkeypatch.setattr(of_fairness, "_LARGE", 162)
+    assert patience() == [2, 2, 6]
 
 
 def fairness_weight(job: FairProblem, blur: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 from torch import Tensor
@@ -16,6 +17,7 @@ _SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
 _LARGEST_SHARE = 1.3
 _HEAVIEST = 1.0 + 2.0 * _SHARE_STEP  # the share that this leads to
 _WEAK = 1.0 / 3.0
+_LARGE_PATIENCE = 2  # of stages before the last: what they gain late costs a large mesh more than sharper ones need
 _LITTLE_MORE = 1.02  # times E of the start: what planar faces cost on a mesh that had hardly more than the least
 _WORTHWHILE = 0.1  # of the largest deviation from planarity at the start: less is better than nothing
 _ROOM = 1.25  # times the distance of planar faces: on their limits, vertices would have nowhere to go
@@ -101,6 +103,8 @@ class FairPlan(Plan):
             share, blur = portions.pop(0)
             problem.pulls.aim(share, start)
             settings = problem.settings.stage() if portions else problem.settings.projection
+            if portions and problem.scales.is_large:
+                settings = replace(settings, patience=_LARGE_PATIENCE)
             yield problem.stage(self.state, share, blur, settings)
             self.state = problem.blocks(self.state["vertices"])
             placed = problem.placed(self.state)

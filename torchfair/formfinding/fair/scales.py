@@ -29,6 +29,11 @@ class Scales(NamedTuple):
     fairness: float = 1.0
     bluntest: float = math.inf
 
+    @property
+    def is_large(self) -> bool:
+        """Whether the mesh has so many vertices that each step takes seconds."""
+        return math.isfinite(self.bluntest)
+
     def smoothed(self, smoothing: float, blur: float) -> float:
         """The smoothing of a stage from that of the settings and the factor of the stage, at least 1."""
         sharp = smoothing * self.smoothing
