@@ -88,10 +88,8 @@ def test_three_valent_vertices_lie_between_their_neighbours(monkeypatch: pytest.
 
 def test_three_valent_vertices_on_creases_stay() -> None:
     """One of two that lie off their triangles, at the tops of two flat pyramids."""
-    base = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]
-    positions = torch.tensor(
-        [*base, [0.9, 0.05, 0.01], *([x + 4, y, z] for x, y, z in base), [4.9, 0.05, 0.01]], dtype=torch.float64
-    )
+    one = torch.tensor([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.9, 0.05, 0.01]], dtype=torch.float64)
+    positions = torch.cat([one, one + torch.tensor([4.0, 0, 0])])
     faces = [[a + k, b + k, 3 + k] for k in (0, 4) for a, b in ((0, 1), (1, 2), (2, 0))]
     surface = read_surface(*ellipsoid(HALF_LONG), MeshingSettings())
     creases = MeshCreases(torch.tensor([[0, 3], [1, 3]]), torch.zeros(0, 2, 3))
