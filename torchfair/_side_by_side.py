@@ -35,8 +35,10 @@ def side_by_side(function: Callable[[Item], Result], items: Sequence[Item], vert
         What ``function`` raises, for the first item of which it does; items that were not begun are left out then, and
         on an interrupt.
     """
+    if torch.compiler.is_compiling() or vertices.shape[-2] < _LEAST or vertices.device.type != "cpu":
+        return [function(item) for item in items]
     workers = min(allowed_threads(), len(items), _MOST)
-    if workers < 2 or vertices.shape[-2] < _LEAST or vertices.device.type != "cpu" or _is_followed(vertices):
+    if workers < 2 or _is_followed(vertices):
         return [function(item) for item in items]
     inference, recording, before = torch.is_inference_mode_enabled(), torch.is_grad_enabled(), torch.get_num_threads()
 
