@@ -19,7 +19,7 @@ import torchfair
 HEAVY = {
     *("trimesh", "kornia", "kornia_rs", "networkx", "PIL", "rslab"),
     *("matplotlib", "rich", "polyscope", "viser", "pyvista", "vtk", "plotly"),
-    *("scipy.spatial", "scipy.optimize", "scipy.sparse.csgraph"),
+    *("scipy.spatial", "scipy.optimize", "scipy.sparse.csgraph", "scipy.io"),
 }
 
 

@@ -35,10 +35,8 @@ def side_by_side(function: Callable[[Item], Result], items: Sequence[Item], vert
         What ``function`` raises, for the first item of which it does; items that were not begun are left out then, and
         on an interrupt.
     """
-    if torch.compiler.is_compiling() or vertices.shape[-2] < _LEAST or vertices.device.type != "cpu":
-        return [function(item) for item in items]
-    workers = min(allowed_threads(), len(items), _MOST)
-    if workers < 2 or _is_followed(vertices):
+    workers = _workers(len(items), vertices)
+    if workers < 2:
         return [function(item) for item in items]
     inference, recording, before = torch.is_inference_mode_enabled(), torch.is_grad_enabled(), torch.get_num_threads()
 
@@ -56,7 +54,15 @@ def side_by_side(function: Callable[[Item], Result], items: Sequence[Item], vert
             torch.set_num_threads(before)
 
 
+def _workers(items: int, vertices: Tensor) -> int:
+    """How many threads there are to be."""
+    if torch.compiler.is_compiling() or vertices.shape[-2] < _LEAST or vertices.device.type != "cpu":
+        return 1
+    return 1 if _is_followed(vertices) else min(allowed_threads(), items, _MOST)
+
+
 def _is_followed(vertices: Tensor) -> bool:
+    """Whether derivatives, transforms, recordings or modes of torch follow what is computed in this thread."""
     return (
         (vertices.requires_grad and torch.is_grad_enabled())
         or is_transformed()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from torchfair import MeshFileError
-from torchfair.io import obj, ply, quick_ply, quick_rows
+from torchfair.io import decimals, obj, ply, quick_ply, quick_rows
 from torchfair.io.obj_attributes import ObjAttributes
 from torchfair.io.ply_header import read_header
 from torchfair.io.quick_rows import float_rows, int_rows, portions
@@ -96,6 +97,14 @@ words = st.sampled_from(
      b"-", b"1-2", b"+.5", b"5.", b"\\", b"1/", b"x"]
 )  # fmt: skip
 blanks = st.sampled_from([b" ", b" ", b" ", b"\n", b"\n", b"\r\n", b"\t", b"  ", b""])
+
+
+@pytest.fixture(scope="module", params=[0, 1 << 30], ids=["many", "few"], autouse=True)
+def reader_of_digits(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Every test with the reader of many numbers and with that of few."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(decimals, "FEW", request.param)
+        yield
 
 
 @settings(deadline=None, max_examples=300)

@@ -37,8 +37,9 @@ def largest_distance(points: Tensor, vertices: Tensor, topology: Topology, owner
     cut = cut_faces(to_columns(vertices, "vertices").T, topology)
     corners, columns = cut.points[cut.corners], to_columns(points, "points")
     shape = Triangles(corners)
-    unbounded = np.full(columns.shape[1], np.inf)
-    bounds = unbounded if owners is None else _bounds(shape, columns, cut, owners.cpu().numpy())
+    bounds = np.full(columns.shape[1], np.inf)
+    if owners is not None:
+        bounds = _bounds(shape, columns, cut, owners.cpu().numpy())
     order, reached, start = (-bounds).argsort(kind="stable"), 0.0, 0
     while start < order.size and bounds[order[start]] > reached:
         size = BLOCK if start or owners is None else _FIRST

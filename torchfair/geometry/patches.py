@@ -79,11 +79,10 @@ class Patches:
             few = np.flatnonzero(counts < _FEW * lattice)
             grown = _grown(exact[few], step, np.full(len(few), _ENOUGH * lattice), self.rings)
             border, wanted = _border(topology, step, self.rings)
-            wide = _grown(exact[border], step, wanted, 2 * self.rings)
-            whole = _replaced(exact, few, grown)
-            inner = np.setdiff1d(np.arange(len(counts)), border)
-            shared = _grouped(whole[inner], inner, topology.device)
-            self.groups = [*shared, *_grouped(whole[border], border, topology.device)]
+            narrow = _replaced(exact, few, grown)
+            wide = _replaced(narrow, border, _grown(exact[border], step, wanted, 2 * self.rings))
+            shared = _grouped(narrow, np.setdiff1d(np.arange(len(counts)), border), topology.device)
+            self.groups = [*shared, *_grouped(narrow, border, topology.device)]
             self.wide = [*shared, *_grouped(wide, border, topology.device)]
             self.places, self.wide_places = _places(self.groups), _places(self.wide)
             self.border = torch.from_numpy(np.isin(np.arange(len(counts)), border)).to(topology.device)
@@ -108,20 +107,21 @@ class Patches:
 
 
 def _grouped(around: sp.csr_array, centres: Ints, device: torch.device) -> list[PatchGroup]:
-    """Groups of the rows of (n, V), which are patches of the vertices ``centres`` (n,)."""
-    counts = np.diff(around.indptr)
+    """Groups of the patches of vertices ``centres`` (n,), rows of (V, V)."""
+    counts = np.diff(around.indptr)[centres]
     order = np.argsort(counts, kind="stable")
+    centres, counts = centres[order], counts[order]
     groups: list[PatchGroup] = []
     low = 0
-    while low < len(order):
-        sizes = counts[order[low:]] * np.arange(1, len(order) - low + 1)
-        high = low + max(int(np.searchsorted(sizes, _PAIRS, side="right")), 1)
-        rows = order[low:high]
-        columns = np.arange(counts[rows].max())
-        present = columns < counts[rows, None]
-        places = around.indptr[rows, None] + np.where(present, columns, 0)
-        members = np.where(present, around.indices[places], centres[rows, None]).astype(np.int64)
-        groups.append(PatchGroup(*(torch.from_numpy(array).to(device) for array in (centres[rows], members, present))))
+    while low < len(centres):
+        pairs = counts[low:] * np.arange(1, len(centres) - low + 1)
+        high = low + max(int(np.searchsorted(pairs, _PAIRS, side="right")), 1)
+        some = centres[low:high]
+        columns = np.arange(counts[high - 1])
+        present = columns < counts[low:high, None]
+        places = around.indptr[some, None] + np.where(present, columns, 0)
+        members = np.where(present, around.indices[places], some[:, None]).astype(np.int64)
+        groups.append(PatchGroup(*(torch.from_numpy(array).to(device) for array in (some, members, present))))
         low = high
     return groups
 
@@ -171,6 +171,8 @@ def _replaced(matrix: sp.csr_array, rows: Ints, by: sp.csr_array) -> sp.csr_arra
     """The matrix with other ``rows`` (n,), those of ``by`` (n, V)."""
     from scipy.sparse import vstack
 
+    if not len(rows):
+        return matrix
     others = np.setdiff1d(np.arange(matrix.shape[0]), rows)
     whole: sp.csr_array = vstack([matrix[others], by], format="csr")[np.argsort(np.concatenate([others, rows]))]
     return whole

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .decimals import Mask
 from .obj_attributes import CornerTextures
-from .quick_rows import Mask, Portion, float_rows, int_rows, is_usual, portions, split_at_slashes, without_word
+from .quick_rows import Portion, float_rows, int_rows, is_usual, portions, split_at_slashes, without_word
 from .raw_mesh import Floats, Ints
 from .text import Words
 

@@ -11,18 +11,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from .decimals import decimals
+from .decimals import BLANKS, DIGITS, Codes, Mask, decimals
 from .raw_mesh import Floats, Ints
-
-Codes = npt.NDArray[np.uint8]
-Mask = npt.NDArray[np.bool_]
 
 PORTION = 1 << 22
 """Bytes that are looked at together: few enough for the cache and the memory, enough for little overhead."""
 _SPACE, _NEWLINE = 32, 10
-_INT = b"0123456789+- \t\r\n"
+_INT = DIGITS + b"+-" + BLANKS
 _MOST_DIGITS = 18  # more may not fit into 64 bits
 _PLUS, _MINUS, _ZERO = b"+-0"
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from torch import Tensor
+
 from ..settings.meshing_settings import MeshingSettings
 from .components import Pieces, ReadSurface, on_surface
 from .counts import mesh_to_count
@@ -45,28 +47,28 @@ class RowLattice:
         """
         across = rows_across(self.surface.frames, self.surface.directions)
         pieces, spacing = self._along(across)
-        over = len(turned_over(pieces, self.surface))
-        if not over:
+        over = turned_over(pieces, self.surface)
+        if not len(over):
             return pieces, spacing
-        left = over
-        if self.settings.fallback:
-            try:
-                others, other_spacing = self._along(not across)
-            except NoMeshError:
-                pass
-            else:
-                left = min(over, len(turned_over(others, self.surface)))
-        names = ("smaller", "larger") if across else ("larger", "smaller")
         notes = []
-        if left < over:
-            pieces, spacing = others, other_spacing
-            spared = f"along the {names[0]} one {_triangles(over)} turned over"
-            notes.append(f"rows follow the {names[1]} curvature: {spared}")
-        if left:
-            place = pieces.positions[pieces.faces[int(turned_over(pieces, self.surface)[0])]].mean(0)
-            where = ", ".join(f"{of:.4g}" for of in place)
-            notes.append(f"{_triangles(left)} turned over, one at ({where}): ask for more or fewer, or for quads")
+        other = self._turned(across) if self.settings.fallback else None
+        if other is not None and len(other[2]) < len(over):
+            spared = _triangles(len(over))
+            pieces, spacing, over = other
+            names = ("larger", "smaller") if across else ("smaller", "larger")
+            notes.append(f"rows follow the {names[0]} curvature: along the {names[1]} one {spared} turned over")
+        if len(over):
+            place = ", ".join(f"{of:.4g}" for of in pieces.positions[pieces.faces[int(over[0])]].mean(0))
+            notes.append(f"{_triangles(len(over))} turned over, one at ({place}): ask for more or fewer, or for quads")
         return replace(pieces, notes=[*pieces.notes, *notes]), spacing
+
+    def _turned(self, across: bool) -> tuple[Pieces, float, Tensor] | None:
+        """Along the other curvature, with the faces that are turned over there; None if there is no valid mesh."""
+        try:
+            pieces, spacing = self._along(not across)
+        except NoMeshError:
+            return None
+        return pieces, spacing, turned_over(pieces, self.surface)
 
     def _along(self, across: bool) -> tuple[Pieces, float]:
         """With rows along the smaller curvature (``across``), or along the larger one."""

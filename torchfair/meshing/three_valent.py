@@ -27,13 +27,15 @@ def with_three_valent_inside(pieces: Pieces, surface: ReadSurface) -> Pieces:
         pieces: triangles.
         surface: that they were made from; new places are the closest points of its triangles.
     """
-    topology = Topology.from_faces(pieces.faces, len(pieces.positions))
-    chosen = (topology.valences == 3) & ~topology.is_boundary_vertex
-    chosen[pieces.creases.edges.flatten()] = False
-    centres = chosen.nonzero().squeeze(1)
+    of_valence = Topology.from_faces(pieces.faces, len(pieces.positions)).rings_by_valence
+    if 3 not in of_valence:
+        return pieces
+    centres, ring = of_valence[3]
+    free = ~torch.isin(centres, pieces.creases.edges)
+    centres, ring = centres[free], ring[free]
     positions = torch.from_numpy(pieces.positions)
     before = positions[centres]
-    inside = between(before, positions[_neighbours(topology, centres, pieces.rows)])
+    inside = between(before, positions[_rows_first(centres, ring, pieces.rows)])
     moved = (inside != before).any(1)
     if not moved.any():
         return pieces
@@ -72,12 +74,8 @@ def _weights(points: Tensor, corners: Tensor) -> Tensor:
     return weights
 
 
-def _neighbours(topology: Topology, vertices: Tensor, rows: set[tuple[int, int]]) -> Tensor:
-    """(n, 3) vertices around those with three triangles, those on rows with them first."""
-    triangles = topology.triangles
-    face, corner = (triangles[:, :, None] == vertices).any(-1).nonzero().unbind(1)
-    order = triangles[face, corner].argsort()
-    around = triangles[face, (corner + 1) % 3][order].reshape(-1, 3).tolist()
-    for centre, others in zip(vertices.tolist(), around, strict=True):
-        others.sort(key=lambda other, centre=centre: (min(centre, other), max(centre, other)) not in rows)
-    return torch.tensor(around, dtype=torch.int64).reshape(-1, 3)
+def _rows_first(centres: Tensor, ring: Tensor, rows: set[tuple[int, int]]) -> Tensor:
+    """(n, 3) the neighbours ``ring`` (n, 3) of vertices (n,), those on rows with them first."""
+    edges = torch.stack([centres[:, None].expand_as(ring), ring], -1).sort(-1).values
+    off = torch.tensor([tuple(edge) not in rows for edge in edges.flatten(0, 1).tolist()], dtype=torch.int8)
+    return ring.gather(1, off.view(ring.shape).argsort(dim=1, stable=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
@@ -37,13 +37,14 @@ def star_groups(topology: Topology) -> list[StarGroup]:
     return [StarGroup(*group, corners[valence]) for valence, group in topology.rings_by_valence.items()]
 
 
-def parts_of(groups: Iterable[StarGroup], most: int) -> list[StarGroup]:
-    """The same stars in smaller groups, of at most so many."""
-    return [
-        StarGroup(*(tensor[start : start + most] for tensor in group))
-        for group in groups
-        for start in range(0, group.centres.shape[0], most)
-    ]
+def star_parts(topology: Topology, most: Callable[[int], int]) -> list[StarGroup]:
+    """The groups in parts of at most so many stars, for each number of edges, and one at least."""
+    parts = []
+    for group in star_groups(topology):
+        step = max(1, most(group.ring.shape[1]))
+        for start in range(0, group.centres.shape[0], step):
+            parts.append(StarGroup(*(tensor[start : start + step] for tensor in group)))
+    return parts
 
 
 class Arms(NamedTuple):

@@ -16,7 +16,7 @@ from ..geometry._ops import dot
 from ..geometry.angles import defects
 from ..geometry.normals import angle_weighted
 from ..topology import Topology
-from ._groups import Planes, StarGroup, corner_planes, parts_of, star_arms, star_groups
+from ._groups import Planes, StarGroup, corner_planes, star_arms, star_parts
 from ._judge import edge_signs, judge_stars
 from ._patterns import run_lengths
 
@@ -154,7 +154,7 @@ def classify_stars(vertices: Tensor, topology: Topology) -> StarClasses:
         _judge(vertices, classes, planes, part)
         _take_sides(vertices, classes, planes, part, ordinary[part.centres])
 
-    side_by_side(judge, parts_of(star_groups(topology), _CHUNK), vertices)
+    side_by_side(judge, star_parts(topology, lambda _: _CHUNK), vertices)
     return classes
 
 

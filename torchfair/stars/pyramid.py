@@ -13,7 +13,7 @@ from ..geometry import corner_angles, dihedral_angles, face_normals
 from ..geometry._ops import cross, dot, gather, scatter_sum
 from ..geometry.normals import angle_weighted
 from ..topology import Topology
-from ._groups import StarGroup, parts_of, star_groups
+from ._groups import StarGroup, star_groups, star_parts
 from .arcs import arc_crossings
 
 _ROOM = 1 << 18  # entries of the tables of one chunk of pyramids: few enough for the cache
@@ -100,8 +100,7 @@ def pyramid_self_intersections(vertices: Tensor, topology: Topology) -> Tensor:
         crossings = arc_crossings(gather(normals, faces), noise[..., faces].amax(-1))
         counts[..., part.centres] = crossings.sum((-2, -1)) // 2
 
-    for group in star_groups(topology):
-        side_by_side(count, parts_of([group], max(1, _ROOM // (batch * group.ring.shape[1] ** 2))), vertices)
+    side_by_side(count, star_parts(topology, lambda valence: _ROOM // (batch * valence**2)), vertices)
     return counts
 
 
@@ -137,8 +136,7 @@ def pyramid_windings(vertices: Tensor, topology: Topology) -> Tensor:
         turns = torch.atan2(dot(cross(rows, ahead), axis), dot(rows, ahead)).sum(-1) / (2 * math.pi)
         windings[..., part.centres] = torch.nan_to_num(turns).round().to(torch.int64)
 
-    for group in star_groups(topology):
-        side_by_side(wind, parts_of([group], max(1, _POINTS // (batch * group.ring.shape[1]))), vertices)
+    side_by_side(wind, star_parts(topology, lambda valence: _POINTS // (batch * valence)), vertices)
     return windings
 
 
