@@ -4,6 +4,7 @@ import pytest
 import torch
 from helpers import DOUBLE, cube
 
+from torchfair import Topology
 from torchfair.rasterisation.rasterise import visible_triangles
 from torchfair.shapes import icosphere
 from torchfair.viewing import lines
@@ -92,3 +93,26 @@ def test_lines_are_the_same_however_many_are_looked_at_together(portion: int, mo
     monkeypatch.setattr(lines, "_PORTION", portion)
     assert torch.equal(visible_lines(surface, edges, widths), at_once)
     assert 0.3 * count < len(torch.unique(at_once)) < 0.8 * count
+
+
+@pytest.mark.parametrize("block", [8, 11, 16])
+def test_lines_hidden_as_a_whole_are_told_by_blocks(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As one by one: a fine sphere with a hole that shows its back, partly off the screen; and many are told."""
+    mesh, generator = icosphere(5), torch.Generator().manual_seed(1)
+    vertices = mesh.vertices * (1.0 + 0.01 * torch.rand(len(mesh.vertices), 1, generator=generator, dtype=DOUBLE))
+    front = (mesh.vertices[mesh.topology.triangles].mean(1) @ torch.tensor([0.9, 0.3, 0.3], dtype=DOUBLE)) > 0.97
+    topology = Topology.from_faces(mesh.topology.triangles[~front], num_vertices=len(vertices))
+    towards_eye, up = torch.tensor([[1.0, 0.4, 0.3], [0.0, 0.0, 1.0]], dtype=DOUBLE)
+    camera, size = fit_camera(vertices[vertices[:, 1] > -0.8], towards_eye=towards_eye, up=up, width=150)
+    view = MeshView(vertices, topology, camera, size)
+    surface = Surface(view.points, view.triangulation.triangles, view.triangle_index)
+    widths = 1.0 + 2.0 * torch.rand(topology.num_edges, generator=generator)
+    looked_at, put = [], lines._put_lines
+    monkeypatch.setattr(lines, "_put_lines", lambda *a: (looked_at.append(len(a[2])), put(*a)))
+    one_by_one = visible_lines(surface, topology.edges, widths)
+    monkeypatch.setattr(lines, "_MANY", 1)
+    monkeypatch.setattr(lines, "_BLOCK", block)
+    assert torch.equal(visible_lines(surface, topology.edges, widths), one_by_one)
+    assert looked_at[0] == topology.num_edges
+    assert looked_at[1] < 0.8 * looked_at[0]
+    assert (one_by_one >= 0).any()

@@ -36,6 +36,14 @@ class PlaneTable(NamedTuple):
         depth = z + ((places[:, 0] - x) * right + (places[:, 1] - y) * down)
         return torch.clamp(depth, nearest, farthest), slope
 
+    def farthest(self) -> Tensor:
+        """(n,) largest depths of the triangles."""
+        return self.rows[:, 6]
+
+    def slopes(self) -> Tensor:
+        """(n,) as :meth:`at` gives them."""
+        return self.rows[:, 7]
+
 
 class SeenPlanes(NamedTuple):
     """Planes of the triangles that a picture shows, each worked out once.
@@ -51,7 +59,9 @@ class SeenPlanes(NamedTuple):
     @classmethod
     def of(cls, points: Tensor, triangles: Tensor, nearest: Tensor) -> SeenPlanes:
         """With projected points (V, 3), and of triangles (T, 3) the nearest one (H, W) at each pixel, -1 for none."""
-        covered = nearest >= 0
-        shown, numbers = torch.unique(nearest[covered], return_inverse=True)
-        number = torch.full_like(nearest, -1, dtype=torch.int64).masked_scatter(covered, numbers)
-        return cls(number, PlaneTable.of(points, triangles[shown]))
+        nearest = nearest.to(torch.int64)
+        shown = triangles.new_zeros(len(triangles) + 1, dtype=torch.bool)
+        shown[nearest] = True  # -1 is the last
+        shown[-1] = False
+        numbers = torch.where(shown, shown.cumsum(0) - 1, -1)
+        return cls(numbers[nearest], PlaneTable.of(points, triangles[shown[:-1]]))

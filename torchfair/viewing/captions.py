@@ -9,15 +9,23 @@ from ..topology import Topology
 
 
 def energy_caption(
-    name: str, vertices: Tensor, topology: Topology, reference: tuple[Tensor, Topology] | None = None
+    name: str,
+    vertices: Tensor,
+    topology: Topology,
+    reference: tuple[Tensor, Topology] | None = None,
+    terms: Tensor | None = None,
 ) -> str:
-    """``name``, E and E' of one mesh ``(V, 3)``; with a ``reference`` mesh also how E has changed, in percent."""
+    """``name``, E and E' of one mesh ``(V, 3)``; with a ``reference`` mesh also how E has changed, in percent.
+
+    The ``terms`` (I,) of E' need not be worked out again where they are known.
+    """
     energy = float(normal_variation(vertices, topology))
     caption = f"{literal(name)}     $E$ = {four_digits(energy)}"
     base = float(normal_variation(*reference)) if reference is not None else 0.0
     if base > 0:
         caption += f"  ({signed_percent(energy / base - 1)})"
-    return caption + f"     $E'$ = {four_digits(float(angle_variation(vertices, topology)))}"
+    angles = angle_variation(vertices, topology) if terms is None else terms.sum()
+    return caption + f"     $E'$ = {four_digits(float(angles))}"
 
 
 def four_digits(value: float) -> str:

@@ -14,6 +14,9 @@ from ..rasterisation.scan import Spans, span_chunks, triangle_spans
 _LONGEST = 4096  # samples along one edge
 _DEPTH_SHARE = 1e-3  # of all depths, by which lines may lie behind the surface
 _PORTION = 1 << 18  # lines looked at together: a large mesh would need gigabytes
+_MANY = 1 << 16  # lines from which on those that are hidden as a whole are told first, by blocks of pixels
+_BLOCK = 16  # pixels along each side
+_SLOPES = 1.5  # pixels over which the surface may fall away before it hides a line
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +70,13 @@ def visible_lines(surface: Surface, edges: Tensor, widths: Tensor) -> Tensor:
     if drawn.shape[0]:
         tolerance = _DEPTH_SHARE * float(depths[drawn].amax() - depths[drawn].amin())
         hiding = _Hiding(SeenPlanes.of(surface.points, surface.triangles, surface.face_index), tolerance)
+        farthest = hiding.farthest_of_blocks() if drawn.shape[0] >= _MANY else None
         for some in torch.split(drawn, _PORTION):
-            _put_lines(top, hiding, surface.points.detach()[edges[some]].to(torch.float64), widths[some], some)
+            ends = surface.points.detach()[edges[some]].to(torch.float64)
+            if farthest is not None:
+                before = torch.nonzero(_may_be_seen(farthest, ends)).squeeze(1)
+                ends, some = ends[before], some[before]
+            _put_lines(top, hiding, ends, widths[some], some)
     return top.view(height, width)
 
 
@@ -82,6 +90,25 @@ class _Hiding(NamedTuple):
 
     seen: SeenPlanes
     tolerance: float
+
+    def farthest_of_blocks(self) -> Tensor:
+        """Largest depth at which a line may be seen in each block of pixels or beside it, infinite where nothing is."""
+        number, planes = self.seen
+        depths = planes.farthest() + (_SLOPES * planes.slopes() + self.tolerance)
+        depths = torch.nn.functional.pad(depths, (0, 1), value=torch.inf)[number]  # -1 picks the last
+        height, width = depths.shape
+        depths = torch.nn.functional.pad(depths, (0, -width % _BLOCK, 0, -height % _BLOCK), value=-torch.inf)
+        blocks = depths.unflatten(1, (-1, _BLOCK)).amax(2).unflatten(0, (-1, _BLOCK)).amax(1)
+        return torch.nn.functional.max_pool2d(blocks[None], 3, stride=1, padding=1)[0]
+
+
+def _may_be_seen(farthest: Tensor, ends: Tensor) -> Tensor:
+    """(n,) whether lines (n, 2, 3) are longer than a block of pixels, or not behind all that is seen around them."""
+    rows, columns = farthest.shape
+    column, row = (ends[:, 0, :2] / _BLOCK).floor().clamp(min=0).unbind(1)
+    block = (row.clamp(max=rows - 1) * columns + column.clamp(max=columns - 1)).to(torch.int64)
+    long = ((ends[:, 1] - ends[:, 0])[:, :2].abs() > _BLOCK).any(1)
+    return long | (ends[..., 2].amin(1) <= farthest.flatten()[block])
 
 
 def _put_lines(top: Tensor, hiding: _Hiding, ends: Tensor, widths: Tensor, numbers: Tensor) -> None:
@@ -145,7 +172,7 @@ def _seen_samples(hiding: _Hiding, ends: Tensor, steps: Tensor) -> tuple[Tensor,
     over = torch.nonzero(~seen).squeeze(1)
     if over.shape[0]:
         depth, slope = hiding.seen.planes.at(behind[over], places[over, :2])
-        seen[over] = places[over, 2] <= depth + (1.5 * slope + hiding.tolerance)
+        seen[over] = places[over, 2] <= depth + (_SLOPES * slope + hiding.tolerance)
     return seen, first
 
 

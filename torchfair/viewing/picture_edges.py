@@ -67,8 +67,8 @@ def picture_edges(
         raise ShapeError("meshes", "at least one", "none")
     topologies = topologies_of(len(meshes), topology)
     vertices = [one_mesh(v, t) for v, t in zip(meshes.values(), topologies, strict=True)]
-    values = [angle_variation_per_edge(v, t) for v, t in zip(vertices, topologies, strict=True)]
-    label, values = _comparable(values, vertices, topologies)
+    terms = [angle_variation_per_edge(v, t) for v, t in zip(vertices, topologies, strict=True)]
+    label, values = _comparable(terms, vertices, topologies)
     scale = ColorScale.of(torch.cat(values), label, color_map="magma_r", lightest=_LIGHTEST)
     columns = min(columns, len(meshes))
     panel = (width - 2 * MARGIN - BAR - (columns - 1) * GAP) // columns
@@ -81,7 +81,7 @@ def picture_edges(
     for number, (name, mesh) in enumerate(zip(meshes, vertices, strict=True)):
         left = MARGIN + (number % columns) * (panel + GAP)
         top = sheet.top + (number // columns) * row
-        sheet.caption(energy_caption(name, mesh, topologies[number]), left, top, panel)
+        sheet.caption(energy_caption(name, mesh, topologies[number], terms=terms[number]), left, top, panel)
         shown = MeshView(mesh, topologies[number], camera, size)
         sheet.image(_panel(shown, values[number], scale), left, top + CAPTION)
     scale.draw_bar(sheet, rows * row)
