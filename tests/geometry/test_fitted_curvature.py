@@ -398,3 +398,23 @@ def test_bad_input() -> None:
     with pytest.raises(TorchfairError, match='estimator must be "fitted"'):
         principal_directions(vertices, topology, estimator="cotangent")
     assert math.isfinite(float(fitted_curvature(vertices * 0, topology).operators.sum()))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_fits_at_some_vertices(noise: float) -> None:
+    """At all that are asked for as everywhere, but for what is pooled over fewer of them; zeros elsewhere."""
+    mesh = irregular_triangles(Torus(2.0, 0.8), 1500)
+    shake = torch.randn(mesh.vertices.shape, generator=torch.Generator().manual_seed(0), dtype=DOUBLE)
+    vertices = mesh.vertices + noise * edge_lengths(mesh.vertices, mesh.topology).mean() * shake
+    every = fitted_curvature(vertices, mesh.topology)
+    whole = fitted_curvature(vertices, mesh.topology, at=torch.ones(1500, dtype=torch.bool)[: len(vertices)])
+    assert whole.operators.equal(every.operators)
+    assert whole.doubts.equal(every.doubts)
+    at = torch.rand(len(vertices), generator=torch.Generator().manual_seed(1)) < 0.2
+    some = fitted_curvature(vertices, mesh.topology, at=at)
+    assert some.rings == every.rings
+    apart = (some.operators - every.operators)[at].norm(dim=(1, 2)) / every.operators[at].norm(dim=(1, 2))
+    assert float(apart.median()) < (0.03 if noise else 1e-3)
+    assert (some.operators[~at] == 0).all()
+    assert (some.confidence[~at] == 0).all()
+    assert all(x.isfinite().all() for x in (some.normals, some.doubts, some.scales, some.curvatures))

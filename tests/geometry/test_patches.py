@@ -8,7 +8,7 @@ from geometry_meshes import mixed_grid, with_isolated
 from helpers import wavy_grid
 
 from torchfair import Topology
-from torchfair.errors import SettingsError
+from torchfair.errors import SettingsError, ShapeError
 from torchfair.geometry import Patches
 from torchfair.geometry import patches as patches_module
 from torchfair.shapes import Paraboloid, Torus, irregular_triangles, rotated_lattice
@@ -129,3 +129,25 @@ def test_connected_parts_have_the_wide_patches_that_they_have_alone() -> None:
         for centres, _, present in patches.wide:
             count[centres] = present.sum(1)
     assert counts[1][: large.num_vertices].equal(counts[0])
+
+
+@pytest.mark.parametrize("rings", [2, 3])
+def test_patches_of_some_vertices_are_those_of_all(rings: int) -> None:
+    topology = irregular_triangles(Paraboloid(1.0, -0.5), 1500).topology
+    at = torch.rand(topology.num_vertices, generator=torch.Generator().manual_seed(0)) < 0.2
+    some, every = Patches(topology, rings, at=at), Patches(topology, rings)
+    assert table(some, topology.num_vertices).equal(table(every, topology.num_vertices) * at[:, None])
+    assert some.border.equal(every.border & at)
+    assert some.border.any() == (rings == 3)
+    assert some.sizes.equal(every.sizes * at)
+    values = torch.rand(topology.num_vertices, 2, dtype=torch.float64)
+    near = (table(every, topology.num_vertices) * at).double()
+    expected = at[:, None] * (near @ values) / near.sum(1, keepdim=True).clamp_min(1.0)
+    assert torch.allclose(some.means(values), expected)
+
+
+def test_chosen_vertices_are_true_or_false() -> None:
+    topology = irregular_triangles(Torus(), 100).topology
+    for wrong in (torch.arange(5), torch.ones(3, dtype=torch.bool)):
+        with pytest.raises(ShapeError, match="at: expected a boolean tensor"):
+            Patches(topology, 2, at=wrong)

@@ -12,7 +12,7 @@ from torch import Tensor
 from torchfair import Topology
 from torchfair._names import Names
 from torchfair.geometry import edge_lengths
-from torchfair.measuring import diagnose_mesh, layout_advice, pattern_words, star_remedies, star_remedy
+from torchfair.measuring import diagnose_mesh, layout_advice, pattern_words, remedies, star_remedies, star_remedy
 from torchfair.measuring import remedies as remedies_module
 from torchfair.shapes import Catenoid, Hyperboloid, Torus, icosphere, principal_triangles, rotated_lattice
 
@@ -99,6 +99,19 @@ def test_layouts_are_judged_by_principal_directions() -> None:
     assert all("--seed" not in sentence for sentence in advice)
     sphere = icosphere(2)
     assert layout_advice(sphere.vertices, sphere.topology, diagnose_mesh(sphere.vertices, sphere.topology)) == []
+
+
+def test_layouts_of_large_meshes_are_judged_by_directions_at_some_vertices(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same family, as far off as by all fits, within a degree."""
+    for mesh in (rotated_lattice(Hyperboloid(), 20, 28, 0.25), rotated_lattice(Torus(), 20, 60, 0.1)):
+        diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
+        everywhere = layout_advice(mesh.vertices, mesh.topology, diagnosis)
+        monkeypatch.setattr(remedies, "_LARGE", 0)
+        sampled = layout_advice(mesh.vertices, mesh.topology, diagnosis)
+        monkeypatch.undo()
+        off, near = (int(re.findall(r"is (\d+) degrees off", words[0])[0]) for words in (everywhere, sampled))
+        assert abs(off - near) <= 1
+        assert re.findall(r"--seed \d+ \d+", sampled[0]) == re.findall(r"--seed \d+ \d+", everywhere[0]) != []
 
 
 def test_patterns_in_words() -> None:

@@ -117,7 +117,8 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
         return *_believed_fit(members, least, own, noise, degree), members.scale[..., None]
 
     believed = side_by_side(believed_fit, range(len(patches.wide)), vertices)
-    coefficients, uncertainty, scale = (patches.in_order([fit[i] for fit in believed], wide=True) for i in range(3))
+    coefficients, uncertainty = (patches.in_order([fit[i] for fit in believed], wide=True) for i in range(2))
+    scale = patches.in_order([fit[2] for fit in believed], wide=True, elsewhere=1.0)
     return Heights(frames, scale.squeeze(-1), coefficients, uncertainty.squeeze(-1))
 
 
@@ -220,6 +221,7 @@ def _prior(
     high, weighed = range(3, degree + 1), list(zip(terms(degree), shares(degree), strict=True))[:-_NEEDED]
     masks = spread.new_tensor([[share * (order == k) for k in high] for (order, _), share in weighed])
     noise = spread @ masks  # per unit of variance, (*batch, V, orders)
+    noise = torch.where(noise > 0.0, noise, 1.0)  # where there is no patch
     found = coefficients.square() @ masks
     pooled = torch.cat([variance[..., None], found / noise, 1.0 / noise], dim=-1)
     for _ in range(_POOLING):

@@ -103,7 +103,9 @@ class FittedCurvature:
 
 
 @in_single_at_least
-def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patches | None = None) -> FittedCurvature:
+def fitted_curvature(
+    vertices: Tensor, topology: Topology, *, rings: int | Patches | None = None, at: Tensor | None = None
+) -> FittedCurvature:
     r"""Normal and shape operator of the surface at every vertex, by polynomials over rings of vertices.
 
     The surface around a vertex is a height over its tangent plane, and a polynomial of degree four is fitted to the
@@ -120,9 +122,12 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
         topology: connectivity; any polygons, mixed.
         rings: how many rings around every vertex; or :class:`Patches` of the topology, made before, as
             ``torch.compile`` needs them. By default chosen by the noise that is found: :func:`rings_for_noise`.
+        at: (V,) at which vertices curvature is wanted, true or false; at all if left out. Takes no part where patches
+            are given, which have their own.
 
     Returns:
-        Tensors of the vertices' dtype, computed in double precision. Zeros at isolated vertices and where
+        Tensors of the vertices' dtype, computed in double precision. Operators are zeros where they are not wanted, and
+        normals those of :func:`vertex_normals`. Zeros at isolated vertices and where
         :func:`vertex_normals` is zero. Where there are too few vertices for a polynomial, its higher terms are
         small or zero; where a patch has no more than six, directions have no confidence.
 
@@ -141,8 +146,8 @@ def fitted_curvature(vertices: Tensor, topology: Topology, *, rings: int | Patch
     """
     topology.check_vertices(vertices)
     if rings is None:
-        return _fitted_by_noise(vertices, topology)
-    patches = rings if isinstance(rings, Patches) else Patches(topology, rings)
+        return _fitted_by_noise(vertices, topology, at)
+    patches = rings if isinstance(rings, Patches) else Patches(topology, rings, at=at)
     check_count("rings", patches.rings, least=_LEAST_RINGS)
     if patches.places.shape[0] != topology.num_vertices:
         raise ShapeError("rings", f"patches of {topology.num_vertices} vertices", patches.places.shape[0])
@@ -183,18 +188,19 @@ def rings_for_noise(vertices: Tensor, topology: Topology) -> int:
         return _fitted_by_noise(vertices.detach(), topology).rings
 
 
-def _fitted_by_noise(vertices: Tensor, topology: Topology) -> FittedCurvature:
+def _fitted_by_noise(vertices: Tensor, topology: Topology, at: Tensor | None = None) -> FittedCurvature:
     """Over as many rings as :func:`rings_for_noise` says; the fits that tell are those returned."""
-    fit = fitted_curvature(vertices, topology, rings=_LEAST_RINGS)
-    least = _relative_doubt(fit)
+    fit = fitted_curvature(vertices, topology, rings=_LEAST_RINGS, at=at)
+    least = _relative_doubt(fit, at)
     if not _WANTED < least < math.inf:
         return fit
     wanted = (_LEAST_RINGS + 0.5) * float((least / _WANTED) ** (1 / 3)) - 0.5
     rings = min(max(math.ceil(wanted), _LEAST_RINGS + 1), _MOST_RINGS)
-    patches = Patches(topology, rings)
+    patches = Patches(topology, rings, at=at)
     wider = fitted_curvature(vertices, topology, rings=patches)
-    inner = ~patches.border if not bool(patches.border.all()) else None  # wide patches are always less uncertain
-    return wider if _relative_doubt(wider, inner) < _relative_doubt(fit, inner) else fit
+    inner = ~patches.border if at is None else at & ~patches.border  # wide patches are always less uncertain
+    where = inner if bool(inner.any()) else at
+    return wider if _relative_doubt(wider, where) < _relative_doubt(fit, where) else fit
 
 
 def _relative_doubt(fit: FittedCurvature, where: Tensor | None = None) -> float:

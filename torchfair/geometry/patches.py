@@ -11,6 +11,7 @@ from torch import Tensor
 
 from .._numbers import check_count
 from .._side_by_side import side_by_side
+from ..errors import ShapeError
 from ..topology import Topology
 from ._ops import gather
 
@@ -55,43 +56,50 @@ class Patches:
     Args:
         topology: any polygon mesh.
         rings: 1 or more.
+        at: (V,) of which vertices there are patches, true or false; of all if left out.
 
     Raises:
         SettingsError: if ``rings`` is no such number.
+        ShapeError: if ``at`` is no such tensor.
 
     Attributes:
         rings: as asked for.
+        at: as given.
         groups: all patches, those without wide ones first, and small ones before larger ones in both.
-        places: (V,) of each vertex in the groups one after the other.
+        places: (V,) of each vertex in the groups one after the other; behind the last where it has no patch.
         wide: the groups again, with wide patches in place of narrow ones; those without are the same objects.
         wide_places: (V,) of each vertex in them.
         border: (V,) whether there is a wide patch of the vertex.
     """
 
-    def __init__(self, topology: Topology, rings: int) -> None:
+    def __init__(self, topology: Topology, rings: int, *, at: Tensor | None = None) -> None:
         check_count("rings", rings, least=1)
-        self.rings = int(rings)
+        self.rings, self.at = int(rings), at
+        if at is not None and (at.shape != (topology.num_vertices,) or at.dtype != torch.bool):
+            raise ShapeError("at", f"a boolean tensor ({topology.num_vertices},)", f"{tuple(at.shape)} {at.dtype}")
         with torch._C._DisableFuncTorch():  # inside function transforms index tensors have no numbers to read
             step = _step(topology)
-            exact = _within(step, self.rings)
+            centres = np.arange(topology.num_vertices) if at is None else np.flatnonzero(at.cpu().numpy())
+            exact = _within(step, centres, self.rings)
             lattice = 1 + 3 * self.rings * (self.rings + 1)
-            counts = np.diff(exact.indptr)
-            few = np.flatnonzero(counts < _FEW * lattice)
+            few = np.flatnonzero(np.diff(exact.indptr) < _FEW * lattice)
             grown = _grown(exact[few], step, np.full(len(few), _ENOUGH * lattice), self.rings)
-            border, wanted = _border(topology, step, self.rings)
+            border, wanted = _border(topology, step, centres, self.rings)
             narrow = _replaced(exact, few, grown)
             wide = _replaced(narrow, border, _grown(exact[border], step, wanted, 2 * self.rings))
-            shared = _grouped(narrow, np.setdiff1d(np.arange(len(counts)), border), topology.device)
-            self.groups = [*shared, *_grouped(narrow, border, topology.device)]
-            self.wide = [*shared, *_grouped(wide, border, topology.device)]
-            self.places, self.wide_places = _places(self.groups), _places(self.wide)
-            self.border = torch.from_numpy(np.isin(np.arange(len(counts)), border)).to(topology.device)
+            shared = _grouped(narrow, centres, np.setdiff1d(np.arange(len(centres)), border), topology.device)
+            self.groups = [*shared, *_grouped(narrow, centres, border, topology.device)]
+            self.wide = [*shared, *_grouped(wide, centres, border, topology.device)]
+            count = topology.num_vertices
+            self.places, self.wide_places = _places(self.groups, count), _places(self.wide, count)
+            self.border = torch.from_numpy(np.isin(np.arange(count), centres[border])).to(topology.device)
 
     def means(self, values: Tensor) -> Tensor:
-        """Means of the values (*batch, V, d) of the members: (*batch, V, d)."""
+        """Means of the values (*batch, V, d) of the members that have patches: (*batch, V, d)."""
 
         def mean(group: PatchGroup) -> Tensor:
-            shares = group.present.to(values) / group.present.sum(1, keepdim=True)
+            present = group.present if self.at is None else group.present & self.at[group.members]
+            shares = present.to(values) / present.sum(1, keepdim=True)
             return (gather(values, group.members) * shares[..., None]).sum(-2)
 
         return self.in_order(side_by_side(mean, self.groups, values))
@@ -99,36 +107,45 @@ class Patches:
     @property
     def sizes(self) -> Tensor:
         """(V,) numbers of members."""
-        return torch.cat([present.sum(1) for _, _, present in self.groups]).index_select(0, self.places)
+        return self.in_order([present.sum(1)[:, None] for _, _, present in self.groups]).squeeze(1)
 
-    def in_order(self, parts: list[Tensor], *, wide: bool = False) -> Tensor:
-        """Values (*batch, n, d) of the groups, or of the wide ones, as values (*batch, V, d) of the vertices."""
-        return torch.cat(parts, dim=-2).index_select(-2, self.wide_places if wide else self.places)
+    def in_order(self, parts: list[Tensor], *, wide: bool = False, elsewhere: float = 0.0) -> Tensor:
+        """Values (*batch, n, d) of the groups, or of the wide ones, as values (*batch, V, d) of the vertices.
+
+        The value is ``elsewhere`` where there is no patch.
+        """
+        values = torch.cat(parts, dim=-2)
+        if self.at is not None:
+            values = torch.nn.functional.pad(values, (0, 0, 0, 1), value=elsewhere)
+        return values.index_select(-2, self.wide_places if wide else self.places)
 
 
-def _grouped(around: sp.csr_array, centres: Ints, device: torch.device) -> list[PatchGroup]:
-    """Groups of the patches of vertices ``centres`` (n,), rows of (V, V)."""
-    counts = np.diff(around.indptr)[centres]
+def _grouped(around: sp.csr_array, centres: Ints, rows: Ints, device: torch.device) -> list[PatchGroup]:
+    """Groups of the patches in ``rows`` (m,) of (n, V), those of vertices ``centres`` (n,)."""
+    counts = np.diff(around.indptr)[rows]
     order = np.argsort(counts, kind="stable")
-    centres, counts = centres[order], counts[order]
+    rows, counts = rows[order], counts[order]
     groups: list[PatchGroup] = []
     low = 0
-    while low < len(centres):
-        pairs = counts[low:] * np.arange(1, len(centres) - low + 1)
+    while low < len(rows):
+        pairs = counts[low:] * np.arange(1, len(rows) - low + 1)
         high = low + max(int(np.searchsorted(pairs, _PAIRS, side="right")), 1)
-        some = centres[low:high]
+        some = centres[rows[low:high]]
         columns = np.arange(counts[high - 1])
         present = columns < counts[low:high, None]
-        places = around.indptr[some, None] + np.where(present, columns, 0)
+        places = around.indptr[rows[low:high], None] + np.where(present, columns, 0)
         members = np.where(present, around.indices[places], some[:, None]).astype(np.int64)
         groups.append(PatchGroup(*(torch.from_numpy(array).to(device) for array in (some, members, present))))
         low = high
     return groups
 
 
-def _places(groups: list[PatchGroup]) -> Tensor:
-    """(V,) of each vertex in the groups one after the other."""
-    return torch.argsort(torch.cat([group.centres for group in groups])) if groups else torch.zeros(0).long()
+def _places(groups: list[PatchGroup], count: int) -> Tensor:
+    """(V,) of each of ``count`` vertices in the groups one after the other, behind the last where it is in none."""
+    if not groups:
+        return torch.zeros(count, dtype=torch.int64)
+    centres = torch.cat([group.centres for group in groups])
+    return torch.full((count,), len(centres)).to(centres).index_copy(0, centres, torch.arange(len(centres)).to(centres))
 
 
 def _step(topology: Topology) -> sp.csr_array:
@@ -142,9 +159,9 @@ def _step(topology: Topology) -> sp.csr_array:
     return step
 
 
-def _within(step: sp.csr_array, rings: int) -> sp.csr_array:
-    """(V, V), with an entry where the column is within so many rings of the row."""
-    reached = step
+def _within(step: sp.csr_array, centres: Ints, rings: int) -> sp.csr_array:
+    """(n, V), with an entry where the column is within so many rings of the centre (n,) of the row."""
+    reached = step if len(centres) == step.shape[0] else step[centres]
     for _ in range(rings - 1):
         reached = reached @ step
     return reached
@@ -168,7 +185,7 @@ def _grown(reached: sp.csr_array, step: sp.csr_array, wanted: npt.NDArray[np.flo
 
 
 def _replaced(matrix: sp.csr_array, rows: Ints, by: sp.csr_array) -> sp.csr_array:
-    """The matrix with other ``rows`` (n,), those of ``by`` (n, V)."""
+    """The matrix with other ``rows`` (m,), those of ``by`` (m, V)."""
     from scipy.sparse import vstack
 
     if not len(rows):
@@ -178,8 +195,8 @@ def _replaced(matrix: sp.csr_array, rows: Ints, by: sp.csr_array) -> sp.csr_arra
     return whole
 
 
-def _border(topology: Topology, step: sp.csr_array, rings: int) -> tuple[Ints, npt.NDArray[np.float64]]:
-    """Vertices (n,) with wide patches, and how many vertices these are to have (n,)."""
+def _border(topology: Topology, step: sp.csr_array, centres: Ints, rings: int) -> tuple[Ints, npt.NDArray[np.float64]]:
+    """Which of the centres (n,) have wide patches (m,), and how many vertices these are to have (m,)."""
     from scipy.sparse.csgraph import connected_components
 
     if rings < _NOISY:
@@ -193,6 +210,6 @@ def _border(topology: Topology, step: sp.csr_array, rings: int) -> tuple[Ints, n
     parts = connected_components(step, directed=False)[1]
     most = _SHARE * np.bincount(parts)[parts]
     lattice = 1 + 3 * rings * (rings + 1)
-    vertices = np.flatnonzero((distance < rings) & (most > _ENOUGH * lattice))
-    wanted = (_WIDE - (_WIDE - 1.0) * distance[vertices] / rings) * lattice
-    return vertices, np.minimum(wanted, most[vertices])
+    rows = np.flatnonzero(((distance < rings) & (most > _ENOUGH * lattice))[centres])
+    wanted = (_WIDE - (_WIDE - 1.0) * distance[centres[rows]] / rings) * lattice
+    return rows, np.minimum(wanted, most[centres[rows]])

@@ -19,6 +19,7 @@ from .diagnosis import Diagnosis
 
 _TOGETHER = 50  # vertices whose trials are judged at once
 _MANY = 0.2  # share of negatively curved stars that are bad from which on the layout is to blame
+_LARGE = 50_000  # vertices from which on directions are fitted at some of them: misalignments are right to a degree
 _ALIGNED = 0.2  # radians off principal directions up to which a family of edges is worth keeping
 
 
@@ -117,7 +118,9 @@ def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis, *,
     from ..principal import LARGE_MISALIGNMENT, principal_edges_from_directions
 
     try:
-        aligned = principal_edges_from_directions(vertices, topology, allow_exceptions=True)
+        aligned = principal_edges_from_directions(
+            vertices, topology, **_sampled_directions(vertices, topology), allow_exceptions=True
+        )
     except TorchfairError:  # stars without a normal, in a whole component
         return [f"{words}, and there are no principal directions to go by: remesh, or mend degenerate faces first"]
     degrees = math.degrees(aligned.misalignment)
@@ -130,3 +133,15 @@ def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis, *,
     if aligned.misalignment > _ALIGNED:
         advice.append(f"edges that far off have to turn, which bends the shape: {remesh} lays them right")
     return advice
+
+
+def _sampled_directions(vertices: Tensor, topology: Topology) -> dict[str, Tensor]:
+    """Directions of a large mesh and how far they are trusted; nothing for others, where all vertices have fits."""
+    if topology.num_vertices < _LARGE:
+        return {}
+    from ..geometry.sampled_curvature import sampled_curvature
+    from ..principal import LEAST_CONFIDENCE
+
+    fit = sampled_curvature(vertices.double(), topology)
+    directions = fit.directions * ~topology.is_boundary_vertex[:, None, None]
+    return {"directions": directions, "confidence": fit.confidence.clamp_min(LEAST_CONFIDENCE)}

@@ -98,7 +98,8 @@ class _Hiding(NamedTuple):
         depths = torch.nn.functional.pad(depths, (0, 1), value=torch.inf)[number]  # -1 picks the last
         height, width = depths.shape
         depths = torch.nn.functional.pad(depths, (0, -width % _BLOCK, 0, -height % _BLOCK), value=-torch.inf)
-        blocks = depths.unflatten(1, (-1, _BLOCK)).amax(2).unflatten(0, (-1, _BLOCK)).amax(1)
+        rows, columns = (size // _BLOCK for size in depths.shape)
+        blocks = depths.view(rows, _BLOCK, columns, _BLOCK).amax(3).amax(1)
         return torch.nn.functional.max_pool2d(blocks[None], 3, stride=1, padding=1)[0]
 
 
