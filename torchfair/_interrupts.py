@@ -27,9 +27,13 @@ class Interrupts:
 
     def check(self) -> None:
         """Raises KeyboardInterrupt if one is waiting, which it then no longer is."""
-        if self.pending:
-            self.pending = False
+        if self.taken():
             raise KeyboardInterrupt
+
+    def taken(self) -> bool:
+        """Whether one is waiting, which it then no longer is: whoever asks ends what is going on."""
+        waited, self.pending = self.pending, False
+        return waited
 
     def interruptible(self, work: Callable[..., _T], *arguments: object) -> _T:
         """The value of ``work(*arguments)``, in which Ctrl-C acts as it did before; one that waits acts before it."""

@@ -196,6 +196,22 @@ def test_closeness_is_the_distance_and_points_away_from_the_surface() -> None:
     assert (residuals[:, :, None] * jacobians)[:, 0].allclose(points - feet)
 
 
+def test_planes_of_all_vertices_in_order_are_not_copied() -> None:
+    vertices, topology = wavy_grid()
+    planes, every = TangentPlanes(ReferenceSurface(vertices * 1.01, topology)), torch.arange(topology.num_vertices)
+    state, known = {"vertices": vertices}, planes({"vertices": vertices})
+
+    def data(chosen: Tensor) -> tuple[Tensor, ...]:
+        (term,) = constraints.closeness_terms(planes, chosen, weight=1.0)
+        return term.arguments_at(state).data
+
+    for mine, whole in zip(data(every), planes(state), strict=True):
+        assert mine.data_ptr() == whole.data_ptr()
+    for chosen in (every.flip(0), every[:-1], every[1:], every[3:4]):
+        for mine, whole in zip(data(chosen), known, strict=True):
+            assert torch.equal(mine, whole[chosen])
+
+
 def test_closeness_on_the_surface_uses_the_vertex_normal() -> None:
     vertices, topology = cube()
     planes = TangentPlanes(ReferenceSurface(vertices, topology))

@@ -23,13 +23,14 @@ from torchfair.formfinding import (
     SymmetricDesign,
     SymmetricLevel,
     SymmetricSettings,
+    job_report,
     minimise_absolute_curvature,
     minimise_normal_variation,
     principal_symmetric,
 )
 from torchfair.formfinding.form.plan import FormPlan
 from torchfair.principal import PrincipalEdges, principal_edges_of_lattice
-from torchfair.projection import IterationRecord, Status
+from torchfair.projection import IterationRecord, Status, unbegun
 from torchfair.shapes import Cylinder, Torus, principal_triangles
 
 Act = Callable[[], None]
@@ -131,6 +132,50 @@ def test_an_interrupt_while_the_start_is_measured_does_again_just_that(
     assert result.after == result.before
     measured = 1 + (act is stop)  # Ctrl-C waits until it is measured
     assert [len(calls) for calls in counts.values()] == [1, measured]
+
+
+@WAYS
+@pytest.mark.parametrize("boundary", ["fixed", "glide", "free"])
+@pytest.mark.parametrize("phase", ["start", "measuring the start", "plan"])
+def test_a_large_job_that_is_interrupted_before_its_first_step_is_not_set_up(
+    phase: str, boundary: str, act: Act, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The start comes back as it was given, with its own measures, also where vertices would be put on curves."""
+    vertices, topology = quads()
+    settings = replace(FAIR, boundary=boundary)
+    whole = minimise_normal_variation(vertices, topology, settings=settings)
+    monkeypatch.setattr(unbegun, "_LARGE", vertices.numel())
+    compiled = count_calls(monkeypatch, "job.compiled_problems:GuidedProjection")
+    measured = count_calls(monkeypatch, "fair.recipe:fair_measures")
+    disturb(monkeypatch, *FAIR_PHASES[phase][:2], act)
+    result = minimise_normal_variation(vertices, topology, settings=settings)
+    assert (len(compiled), len(measured)) == (0, 1 + (act is stop and phase == "measuring the start"))
+    assert torch.equal(result.vertices, vertices)
+    assert result.after == result.before == whole.before
+    assert result.stopped
+    assert result.holds
+    assert result.steps == 0
+    assert result.projection.status is Status.INTERRUPTED
+    assert "not evaluated" in result.message
+    assert result.projection.solver == "none"
+    assert job_report(result, settings)["status"] is Status.INTERRUPTED
+
+
+@WAYS
+def test_a_large_job_that_is_interrupted_between_stages_keeps_those_done(
+    act: Act, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    vertices, topology = quads()
+    whole = minimise_normal_variation(vertices, topology, settings=FAIR)
+    monkeypatch.setattr(unbegun, "_LARGE", vertices.numel())
+    compiled = count_calls(monkeypatch, "job.compiled_problems:GuidedProjection")
+    disturb(monkeypatch, *FAIR_PHASES["blocks in between"][:2], act)
+    result = minimise_normal_variation(vertices, topology, settings=FAIR)
+    assert len(compiled) == 1
+    done = [run for run in result.runs if run.iterations]
+    assert torch.equal(done[-1].blocks["vertices"], whole.runs[0].blocks["vertices"])
+    assert result.projection.status is Status.INTERRUPTED
+    assert result.after["normal_variation"] < result.before["normal_variation"]
 
 
 def test_in_another_thread_interrupts_that_are_raised_keep_the_stages_done(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import torch
 from helpers import DOUBLE, wavy_grid
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair.energies import angle_variation, total_mean_curvature
+from torchfair.energies.angle_variation import lengths_times_angles
 from torchfair.formfinding import FairSettings
+from torchfair.formfinding.fair import measures
 from torchfair.formfinding.fair.recipe import FairRecipe
 from torchfair.geometry import ReferenceSurface
 from torchfair.shapes import Torus, irregular_triangles
@@ -48,6 +53,38 @@ def test_the_start_is_on_itself_and_its_surface_is_not_made_for_that(start, boun
     assert measures["largest_distance"] == measures["largest_distance_back"] == 0.0
     assert "surface" not in vars(recipe.problem.near)
     assert searched(recipe, recipe.given) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("most", [20.0, math.inf])
+def test_the_surface_of_another_reference_is_made_once(most: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was made to see how far it is, and once more to stay near it."""
+    made: list[int] = []
+    ready = ReferenceSurface.__init__
+    monkeypatch.setattr(ReferenceSurface, "__init__", lambda *given: (made.append(1), ready(*given))[1])
+    vertices, topology = wavy_grid(7, 8)
+    settings = FairSettings(boundary="fixed", crease_angle=0.0, reference_distance=most)
+    recipe = FairRecipe(vertices, topology, reference=(vertices * 1.001, topology), settings=settings)
+    before = recipe.before()
+    assert made == [1]
+    assert before["largest_distance_relative"] == pytest.approx(searched(recipe, recipe.given)[0], rel=1e-12)
+    made.clear()
+    recipe.take_reference((vertices * 1.1, topology))  # is not taken for the one before
+    other = recipe.before()
+    assert made == [1]
+    assert other["largest_distance_relative"] == pytest.approx(searched(recipe, recipe.given)[0], rel=1e-12)
+    assert other["largest_distance_relative"] > 10.0 * before["largest_distance_relative"] > 0.0
+
+
+def test_bends_of_edges_are_found_once_for_all_measures(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    monkeypatch.setattr(
+        measures, "lengths_times_angles", lambda *given: (asked.append(1), lengths_times_angles(*given))[1]
+    )
+    for vertices, topology in (closed(), wavy_grid(7, 8)):
+        found = FairRecipe(vertices, topology).before()
+        assert found["angle_variation"] == float(angle_variation(vertices, topology))
+        assert found["total_mean_curvature"] == float(total_mean_curvature(vertices, topology))
+    assert asked == [1, 1]
 
 
 @pytest.mark.parametrize("by", [1e-12, 0.01, 3.0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tracemalloc
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 import torch
 from helpers import DOUBLE, wavy_grid
@@ -41,3 +42,13 @@ def on_a_curve() -> tuple[Callable[[], object], int]:
 def test_a_search_for_one_point_copies_no_table(shape: Callable[[], tuple[Callable[[], object], int]]) -> None:
     search, pieces = shape()
     assert taken(search) < 8 * pieces  # one number of each piece; the tables have 6 to 24
+
+
+def test_a_surface_keeps_few_numbers_of_each_piece() -> None:
+    """Corners, normals and boxes: what follows from these is worked out again; normals of points are kept once."""
+    vertices, topology = wavy_grid(65, 65, triangles=True)
+    surface = ReferenceSurface(vertices, topology)
+    triangles, pieces = surface._triangles, len(surface.pieces)
+    assert triangles._table.nbytes == 12 * 8 * pieces
+    assert surface._smooth.nbytes == 3 * 8 * len(vertices)
+    assert np.shares_memory(surface._corners, surface.pieces.numpy())

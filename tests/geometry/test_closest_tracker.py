@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 import torch
 from closest_reference import ridge, same
@@ -11,6 +12,7 @@ from geometry_meshes import icosphere
 from helpers import DOUBLE, wavy_grid
 
 from torchfair import Topology
+from torchfair.geometry._closest_tracker import _below
 from torchfair.geometry.closest_point import ClosestPointTracker, ReferenceSurface
 
 
@@ -72,3 +74,25 @@ def test_a_tracker_searches_only_points_that_went_far(monkeypatch):
     points[17] += 3.0
     tracker.closest(points)
     assert searched == [17]
+
+
+def test_distances_kept_in_single_precision_are_never_larger_than_they_are():
+    """A candidate that is rounded up could be left out though it is the nearest."""
+    generator = np.random.default_rng(0)
+    distances = np.concatenate(
+        [10.0 ** generator.uniform(-60, 70, 2000), generator.uniform(0.0, 1.0, 2000), [0.0, 1.0]]
+    )
+    single = _below(distances)
+    assert single.dtype == np.float32
+    assert (single.astype(float) <= distances).all()
+    within = (distances > 1e-30) & (distances < 1e30)
+    assert (distances[within] - single[within] <= 2e-7 * distances[within]).all()
+
+
+def test_a_tracker_far_beyond_single_precision():
+    vertices, topology = wavy_grid(4, 5)
+    surface = ReferenceSurface(1e60 * vertices, topology)
+    tracker = surface.tracker()
+    for shift in (0.0, 1e-3, 2e-3):
+        points = 1e60 * (vertices + shift * torch.sin(7.0 * vertices))
+        assert same(tracker.closest(points), surface.closest(points))

@@ -122,9 +122,13 @@ class _ChosenPlanes(IndexedModule):
     def __init__(self, planes: Feet, vertices: Tensor) -> None:
         super().__init__(vertices)
         self.planes = planes
+        self._in_order = torch.equal(vertices, torch.arange(len(vertices), device=vertices.device))
 
     def forward(self, state: State) -> tuple[Tensor, ...]:
-        return tuple(part[self.indices[0]] for part in self.planes(state))
+        (chosen,), planes = self.indices, self.planes(state)
+        if self._in_order and len(chosen) == len(planes[0]):
+            return planes  # all of them: no copy
+        return tuple(part[chosen] for part in planes)
 
 
 class _LimitedPlanes(nn.Module):

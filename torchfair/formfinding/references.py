@@ -49,11 +49,14 @@ def surface_of(reference: GivenReference) -> Reference:
     return ReferenceSurface(*reference) if isinstance(reference, tuple) else reference
 
 
-def refuse_far_reference(reference: GivenReference, vertices: Tensor, topology: Topology, *, most: float) -> None:
+def refuse_far_reference(
+    reference: GivenReference, surface: Reference, vertices: Tensor, topology: Topology, *, most: float
+) -> None:
     """Raises MeshError where a reference is too far away to be meant, or the same shape in another unit.
 
     Args:
-        reference: The surface.
+        reference: The surface, as it was given.
+        surface: The same, as :func:`surface_of` makes it.
         vertices: (V, 3) the start, in the same unit, that of its mean edge.
         topology: Its connectivity; vertices without faces do not count.
         most: Largest distance of a vertex from the reference; infinity allows everything.
@@ -61,7 +64,7 @@ def refuse_far_reference(reference: GivenReference, vertices: Tensor, topology: 
     if most == math.inf:
         return
     used = vertices[topology.valences > 0]
-    farthest = float(distances_from(surface_of(reference), used).max())
+    farthest = float(distances_from(surface, used).max())
     words, same = "", False
     if isinstance(reference, tuple):
         words, same = _likely_unit(_extents(reference[0][reference[1].valences > 0]), _extents(used))

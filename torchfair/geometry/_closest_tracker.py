@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from ._closest_boxes import Floats, Ints
 from ._closest_search import BLOCK, PAIRS, PARTS, Shape, lowest_piece, margin, measure
@@ -64,7 +65,7 @@ class PieceTracker:
         self._anchors = points.copy()
         self._radius = np.zeros(count)
         self._candidates = np.zeros((count, _CANDIDATES), np.int32)
-        self._distances = np.full((count, _CANDIDATES), np.inf)
+        self._distances = np.full((count, _CANDIDATES), np.inf, np.float32)
         self._last = self._shape.guess(points)
         skin = self._skin[self._last]
         self._search(np.arange(count), points, np.where(self._reach(points) < skin, skin, 0.0))
@@ -104,12 +105,19 @@ class PieceTracker:
         rank = np.arange(point.size) - start[point]
         kept = rank < _CANDIDATES
         self._distances[rows] = np.inf
-        self._distances[rows[point[kept]], rank[kept]] = distance[kept]
+        self._distances[rows[point[kept]], rank[kept]] = _below(distance[kept])
         self._candidates[rows[point[kept]], rank[kept]] = piece[kept]
         # Where the list is full, everything beyond it is at least as far as the first piece left out.
         self._radius[rows] = reach
         full = np.flatnonzero(count > _CANDIDATES)
         self._radius[rows[full]] = distance[start[full] + _CANDIDATES]
+
+
+def _below(distances: Floats) -> npt.NDArray[np.float32]:
+    """In single precision, none larger than it was: candidates that might be near are then measured as they are."""
+    with np.errstate(over="ignore"):
+        single = distances.astype(np.float32)
+    return np.where(single > distances, np.nextafter(single, np.float32(-np.inf)), single)
 
 
 def _lengths(vectors: Floats) -> Floats:

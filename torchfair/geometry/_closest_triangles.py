@@ -58,16 +58,14 @@ class Triangles:
     """
 
     def __init__(self, corners: Floats) -> None:
-        starts = np.ascontiguousarray(corners.transpose(2, 1, 0))  # axes: coordinate, corner, triangle
+        self._table = np.empty((12, corners.shape[0]))  # the largest of all: what follows from it is not kept
+        starts = self._table[:9].reshape(3, 3, -1)  # axes: coordinate, corner, triangle
+        starts[:] = corners.transpose(2, 1, 0)
         edges = _edges(starts)
-        squared = dot(edges, edges)
-        normals = unit_normals(starts)
-        inward = np.stack([np.cross(normals, edges[:, k], axis=0) for k in range(3)], axis=1)
-        self.extents: Floats = np.sqrt(squared.max(0))
+        self.extents: Floats = np.sqrt(dot(edges, edges).max(0))
         self.longest = float(self.extents.max())
-        # An edge without length is its start: divided by infinity every point is at place 0.
-        rows = (starts, np.where(squared > TINY, squared, np.inf), inward, normals)
-        self._table = np.concatenate([row.reshape(-1, corners.shape[0]) for row in rows])
+        del edges
+        self._table[9:] = unit_normals(starts)
 
     def prepare(self) -> Triangles:
         """Makes now what the first search would make."""
@@ -120,21 +118,22 @@ class Triangles:
         # The corner opposite to an edge weighs as much as the triangle between that edge and the foot.
         areas = found.inward[[1, 2, 0]]
         total = np.where(found.inside, areas.sum(0), 1.0)
-        positions = np.where(found.inside, points - found.height * table[21:], on_edge)
+        positions = np.where(found.inside, points - found.height * table[9:], on_edge)
         weights = np.where(found.inside, areas / total, on_edge_weights)
         return found.squared, positions, weights
 
 
 def _nearest(points: Floats, table: Floats) -> Nearest:
-    """Where points (3, M) are nearest to the triangles described by the columns of ``table`` (24, M)."""
-    starts, inwards = (table[a : a + 9].reshape(3, 3, -1) for a in (0, 12))
-    edges = _edges(starts)  # not in the table, which is the largest of all
+    """Where points (3, M) are nearest to the triangles described by the columns of ``table`` (12, M)."""
+    starts, normals = table[:9].reshape(3, 3, -1), table[9:]
+    edges = _edges(starts)
     offset = points[:, None] - starts
-    along = dot(offset, edges)
-    along /= table[9:12]  # not times the reciprocal: the end of an edge is at 1 exactly
+    along, squared = dot(offset, edges), dot(edges, edges)
+    # An edge without length is its start: divided by infinity every point is at place 0.
+    along /= np.where(squared > TINY, squared, np.inf)  # not times the reciprocal: the end of an edge is at 1 exactly
     np.clip(along, 0.0, 1.0, out=along)
-    inward = dot(offset, inwards)
-    height = dot(offset[:, 0], table[21:])
+    inward = dot(offset, _cross(normals[:, None], edges))
+    height = dot(offset[:, 0], normals)
     offset -= along * edges
     from_edges = dot(offset, offset)
     inside = (inward[0] > 0) & (inward[1] > 0) & (inward[2] > 0)
@@ -147,6 +146,16 @@ def _edges(starts: Floats) -> Floats:
     ahead: Floats = starts[:, [1, 2, 0]]
     ahead -= starts
     return ahead
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Vector product along the first axis, of length three."""
+    product: Floats = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        np.multiply(a[i], b[j], out=product[k])
+        product[k] -= a[j] * b[i]
+    return product
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from .._portions import portions_unless
 from ..topology import Topology
 
 
@@ -80,11 +81,20 @@ def map_faces(vertices: Tensor, topology: Topology, function: Callable[[Tensor],
         (*batch, F, d) in the order of the faces.
     """
     groups = face_groups(topology)
-    parts = [function(gather(vertices, corners)) for _, corners in groups]
+    parts = [_map_portions(vertices, corners, function) for _, corners in groups]
     if len(parts) == 1:
         return parts[0]
     numbers = torch.cat([numbers for numbers, _ in groups])
     return scatter_sum(torch.cat(parts, dim=-2), numbers, topology.num_faces)
+
+
+def _map_portions(vertices: Tensor, corners: Tensor, function: Callable[[Tensor], Tensor]) -> Tensor:
+    """The same of faces (n, k) with equally many corners, some at a time: temporaries stay in the cache."""
+    parts = [
+        function(gather(vertices, corners[part]))
+        for part in portions_unless(vertices.requires_grad, len(corners), vertices)
+    ]
+    return parts[0] if len(parts) == 1 else torch.cat(parts, dim=-2)
 
 
 def face_groups(topology: Topology) -> list[tuple[Tensor, Tensor]]:

@@ -105,11 +105,14 @@ class ReferenceSurface:
         self.piece_faces = torch.from_numpy(cut.faces)
         self._piece_faces = cut.faces
         self._triangles = Triangles(cut.points[cut.corners]).prepare()
-        # Tables with the pieces in the last axis: (corner, coordinate, piece) and (coordinate, piece).
-        corners = self._point_normals(topology)[self.pieces].numpy().transpose(1, 2, 0)
+        self._corners, smooth = cut.corners, self._point_normals(topology).numpy()
         flat = unit_normal(self.points[self.pieces]).numpy().T
-        self._corner_normals: Floats = np.ascontiguousarray(corners)
-        self._normals: Floats = np.ascontiguousarray(np.where(flat.any(0), flat, _unit(corners.sum(0), flat)))
+        # Tables with points or pieces in the last axis.
+        self._smooth: Floats = np.ascontiguousarray(smooth.T)
+        self._normals: Floats = np.ascontiguousarray(flat)
+        bare = np.flatnonzero(~flat.any(0))
+        sums = smooth[cut.corners[bare]].transpose(1, 2, 0).sum(0)
+        self._normals[:, bare] = _unit(sums, flat[:, bare])
 
     def _point_normals(self, topology: Topology) -> Tensor:
         """Vertex normals, then face normals at the centres of fans: (P, 3)."""
@@ -148,7 +151,8 @@ class ReferenceSurface:
     def _describe_block(self, points: Floats, pieces: Ints) -> Sequence[Floats | Ints]:
         squared, positions, weights = self._triangles.locate(points, pieces)
         flat = self._normals.take(pieces, axis=1)
-        smooth = _unit(dot(weights[:, None], self._corner_normals.take(pieces, axis=2)), flat)
+        at_corners = self._smooth.take(self._corners.take(pieces, axis=0).T, axis=1).transpose(1, 0, 2)
+        smooth = _unit(dot(weights[:, None], at_corners), flat)
         faces = self._piece_faces.take(pieces)
         return positions.T, np.sqrt(squared), faces, flat.T, smooth.T, pieces, weights.T
 

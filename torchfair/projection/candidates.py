@@ -24,6 +24,7 @@ def try_candidates(trials: Trials, proposal: Proposal, state: ProjectionState) -
     bent = [gain < settings.least_uncorrected_gain for gain in trials.gains]
     if trial is not None and any(bent):
         correction = proposal.correction(trial, change, state.accuracy)
+        proposal.system.spare()
         weights, layout = proposal.damping, proposal.system.structure.layout
         sizes = [layout.member_sums(weights * part.square()) for part in (correction, change)]
         moderate = (sizes[0] <= _LARGEST_CORRECTION**2 * sizes[1]).tolist()

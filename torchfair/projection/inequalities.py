@@ -33,7 +33,7 @@ class Inequalities:
 
     def __init__(self, whole: LinearSystem, numbers: list[int]) -> None:
         self._whole, self._numbers = whole, numbers
-        self._equations, self._inequalities = self._split(whole.residuals, whole.affine_residual)
+        self._equations, self._inequalities = self._split(list(whole.residuals), whole.affine_residual)
         self._rows = _Members(whole.structure, numbers, whole)
         self.broken = self._inequalities > 0.0
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from functools import cached_property
+from collections.abc import Callable, Collection, Iterable, Sequence
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import torch
@@ -12,12 +12,30 @@ from torch import Tensor
 from ..linear.block_inverse import block_inverse
 from .loss import apply_root
 from .node_sums import Felt
-from .portions import portions
+from .portions import are_many, portions
 from .row_pattern import RowPattern
 
 if TYPE_CHECKING:
     from .evaluation import Evaluation
     from .system import Structure
+
+
+class ScaledResiduals(Sequence[Tensor]):
+    """Residuals (m, n) of terms times their roots; made whenever they are asked for, of the values that a state has.
+
+    Args:
+        roots: See :class:`LinearSystem`.
+        values: (n, m) of each term, unscaled.
+    """
+
+    def __init__(self, roots: Sequence[Tensor], values: Sequence[Tensor]) -> None:
+        self._roots, self._values = roots, values
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __getitem__(self, number):  # type: ignore[no-untyped-def]
+        return apply_root(self._roots[number], self._values[number]).T
 
 
 class LinearSystem:
@@ -38,18 +56,23 @@ class LinearSystem:
     def __init__(
         self,
         structure: Structure,
-        jacobians: list[Tensor],
-        residuals: list[Tensor],
+        jacobians: list[Tensor] | Callable[[], list[Tensor]],
+        residuals: Sequence[Tensor],
         roots: list[Tensor],
         affine_residual: Tensor | None,
         felt: Felt | None = None,
     ) -> None:
         self.structure = structure
-        self.jacobians = jacobians
+        self._make = jacobians if callable(jacobians) else partial(list, jacobians)
         self.residuals = residuals
         self.roots = roots
         self.affine_residual = affine_residual
-        self.felt: Felt = felt or [None] * len(jacobians)
+        self.felt: Felt = felt or [None] * len(residuals)
+
+    @cached_property
+    def jacobians(self) -> list[Tensor]:
+        """See above; made where they are first asked for."""
+        return self._make()
 
     def of_felt(self, parts: Iterable[Tensor]) -> list[Tensor]:
         """Of values (m, n) of all elements of the terms those of the elements that are felt."""
@@ -131,10 +154,9 @@ class LinearSystem:
         structure = self.structure
         members = structure.layout.members
         total = -structure.layout.member_sums(step * self.gradient)
-        terms, affine = self.changes(step)
-        total -= 0.5 * structure.member_sums([change.square() for change in terms])
-        if affine is not None and structure.affine is not None:
-            total -= 0.5 * structure.affine.member_sums(affine.square(), members)
+        total -= 0.5 * structure.member_sums(self._change(n, step).square() for n in range(len(self.jacobians)))
+        if structure.affine is not None:
+            total -= 0.5 * structure.affine.member_sums(structure.affine.change(step).square(), members)
         return total
 
     @cached_property
@@ -186,6 +208,17 @@ class LinearSystem:
         """``r`` in the row order of :attr:`jacobian`."""
         parts = [r.reshape(-1) for r in self.residuals]
         return torch.cat(parts if self.affine_residual is None else [*parts, self.affine_residual])
+
+    def forget(self) -> None:
+        """Forgets all that large problems can make anew: :meth:`release`, and Jacobians."""
+        if are_many(self.structure.num_unknowns):
+            self.release()
+            self.__dict__.pop("jacobians", None)
+
+    def spare(self) -> None:
+        """Forgets the matrices of large problems, see :meth:`release`."""
+        if are_many(self.structure.num_unknowns):
+            self.release()
 
     def release(self) -> None:
         """Forgets the matrices, which are made anew where they are asked for."""

@@ -45,8 +45,8 @@ class Squares:
         return 0.5 * residuals.square().sum(1)
 
     def root(self, residuals: Tensor) -> Tensor:
-        """One (n,) for each of residuals (n, m)."""
-        return residuals.new_ones(residuals.shape[0])
+        """One (n,) for each of residuals (n, m), the same number in memory."""
+        return residuals.new_ones(1).expand(residuals.shape[0])
 
 
 @dataclass(frozen=True)
@@ -125,8 +125,8 @@ class OneSided:
         return 0.5 * residuals.clamp_min(0.0).square().sum(1)
 
     def root(self, residuals: Tensor) -> Tensor:
-        """One, for the components of residuals (n, m) that are heeded."""
-        return residuals.new_ones(residuals.shape[0])
+        """One (n,), for the components of residuals (n, m) that are heeded; the same number in memory."""
+        return residuals.new_ones(1).expand(residuals.shape[0])
 
 
 def apply_root(root: Tensor, values: Tensor) -> Tensor:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
+from .._portions import PORTION, portions_unless
+
 if TYPE_CHECKING:
     from .layout import State
     from .term import ElementTerm
 
-_PORTION = 16384  # elements for each thread
+_PORTION = PORTION
 
 
 class Arguments(Sequence[Tensor]):
@@ -46,12 +48,7 @@ class Arguments(Sequence[Tensor]):
 
 def portions(count: int, like: Tensor) -> list[slice]:
     """Elements to be worked on at once; all of them while anything is recorded, and on other devices than CPUs."""
-    if torch.compiler.is_compiling() or torch.is_grad_enabled() or not like.is_cpu:
-        return [slice(None)]
-    size = _PORTION * torch.get_num_threads()
-    if count <= 2 * size:
-        return [slice(None)]
-    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
+    return portions_unless(torch.is_grad_enabled(), count, like, _PORTION)
 
 
 def are_many(count: int) -> bool:

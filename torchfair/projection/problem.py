@@ -16,6 +16,7 @@ from .checks import check_way, listed
 from .differentiation import Way
 from .layout import Layout, State
 from .replicate import replicated
+from .same_stencils import on_stencils_of
 from .system import Structure
 from .term import ElementTerm
 
@@ -85,7 +86,7 @@ class Problem:
         """
         result = copy.copy(self)
         result._others = {}
-        result.terms = _differentiated(listed(terms), self._derivatives)
+        result.terms = on_stencils_of(self.terms, _differentiated(listed(terms), self._derivatives))
         with torch.no_grad():
             result.structure = self.structure.with_terms(result.terms)
         if not result.structure.shares_pattern(self.structure):

@@ -127,7 +127,7 @@ class ProjectionResult:
         residuals: Residual table at the final state.
         initial_residuals: Residual table at the start.
         history: One record for each damped step, the start first.
-        solver: Name of the linear solver.
+        solver: Name of the linear solver; ``"none"`` where a large problem was interrupted before it was set up.
         timings: Seconds spent in ``linearise``, ``solve`` and ``merit``, and ``total``.
     """
 

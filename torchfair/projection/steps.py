@@ -25,7 +25,6 @@ from .evaluate import check_linearised, check_start
 from .evaluation import Evaluation
 from .inequalities import Inequalities
 from .layout import State
-from .portions import are_many
 from .problem import Problem
 from .result import IterationRecord, Status
 from .state import Linearised, ProjectionState
@@ -161,8 +160,7 @@ def step(
         )
         after = replace(state, courses=ended)
         return after, record_of(after, timings=watch.parts)
-    if are_many(problem.layout.num_unknowns):
-        proposal.system.release()  # a correction makes them anew; trials need the memory
+    proposal.system.spare()  # a correction makes them anew; trials need the memory
     hand_back_free_memory(problem.layout.num_unknowns)
     trials = Trials(problem, state, proposal, guard, watch)
     try_candidates(trials, proposal, state)
@@ -173,6 +171,7 @@ def step(
     if best is not None:
         proposal.system.release()
         state.linearised.system.release()
+        state.linearised.system.forget()
         del trials, proposal  # with the factor, before the next Jacobians are made
         hand_back_free_memory(problem.layout.num_unknowns)
         with watch.part("linearise"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import torch
@@ -16,8 +16,8 @@ from .block_diagonal import BlockDiagonal
 from .compiled import CompiledTerm
 from .evaluation import Evaluation, Seen, seen
 from .layout import Layout, State
-from .linear_system import LinearSystem
-from .loss import apply_root, is_one_sided
+from .linear_system import LinearSystem, ScaledResiduals
+from .loss import is_one_sided
 from .node_sums import Felt, NodeSums
 from .normal_pattern import NormalPattern
 from .portions import Arguments, are_many, portions
@@ -93,13 +93,12 @@ class Structure:
         if len(chosen) != len(self.terms):
             raise ShapeError("terms", f"{len(self.terms)} with elements and a weight", len(chosen))
         compiled = [known[id(before)].with_term(term) for before, term in zip(self.terms, chosen, strict=True)]
-        result = copy.copy(self)
-        for stale in ("normal_pattern", "block_diagonal", "_row_patterns"):
-            result.__dict__.pop(stale, None)
+        result = self._without_constants()
         result._single = None
         result._take(compiled, self.like.dtype)
         if result.partial != self.partial:
             result.__dict__.pop("_node_sums", None)
+            result.__dict__.pop("_row_patterns", None)
             result._mask()
         pattern = self.__dict__.get("normal_pattern")
         if isinstance(pattern, NormalPattern) and pattern.fits(result.affine):
@@ -108,15 +107,23 @@ class Structure:
 
     def with_free(self, free: Tensor) -> Structure:
         """The structure with other unknowns (N,) that may move; index maps are kept."""
-        result = copy.copy(self)
+        result = self._without_constants()
         result.free = free
-        for stale in ("normal_pattern", "block_diagonal", "_row_patterns"):
-            result.__dict__.pop(stale, None)
         result.affine = None if self.affine is None else self.affine.with_free(free)
         result._mask()
         pattern = self.__dict__.get("normal_pattern")
         if pattern is not None:
             result.__dict__["normal_pattern"] = pattern.with_constant(result.affine)
+        return result
+
+    def _without_constants(self) -> Structure:
+        """A copy without what holds numbers of the linear terms, or which unknowns are free."""
+        result = copy.copy(self)
+        for stale in ("normal_pattern", "block_diagonal", "_row_patterns"):
+            result.__dict__.pop(stale, None)
+        own = self.__dict__.get("_row_patterns", {}).get(False)  # of the terms that are not linear alone
+        if own is not None:
+            result.__dict__["_row_patterns"] = {False: own}
         return result
 
     def shares_pattern(self, other: Structure) -> bool:
@@ -153,7 +160,7 @@ class Structure:
         """
         return self._node_sums.vector(local, factors, felt)
 
-    def member_sums(self, local: Sequence[Tensor]) -> Tensor:
+    def member_sums(self, local: Iterable[Tensor]) -> Tensor:
         """(members,) sums of local values ``(m, n)`` of the terms that are not linear."""
         members = self.layout.members
         parts = [part.view(part.shape[0], members, -1).sum((0, 2)) for part in local]
@@ -228,21 +235,23 @@ class Structure:
     def linearise(self, state: State | Evaluation) -> LinearSystem:
         """Residuals and Jacobians of all terms at a state, scaled by the square roots of their weights."""
         at = state if isinstance(state, Evaluation) else self.evaluate(state)
-        jacobians, residuals, roots, felt = [], [], [], []
-        for number, (compiled, arguments, values) in enumerate(
-            zip(self.compiled, at.arguments, at.values, strict=True)
-        ):
-            chosen = None
-            if self.partial[number] and compiled.term.silent:
-                chosen = torch.nonzero((values != 0.0).any(1)).squeeze(1)
-            felt.append(chosen)
-            roots.append(compiled.term.roots(values))
-            residuals.append(apply_root(roots[-1], values).T)
-            if chosen is not None and not len(chosen):
-                jacobians.append(values.new_zeros(values.shape[1], sum(compiled.widths), 0))
-            else:
-                jacobians.append(self._masked(number, _scaled(arguments, roots[-1], chosen), chosen))
-        return LinearSystem(self, jacobians, residuals, roots, at.affine, felt)
+        roots = [c.term.roots(values) for c, values in zip(self.compiled, at.values, strict=True)]
+        felt: list[Tensor | None] = []
+        for compiled, partial, values in zip(self.compiled, self.partial, at.values, strict=True):
+            silent = partial and compiled.term.silent
+            felt.append(torch.nonzero((values != 0.0).any(1)).squeeze(1) if silent else None)
+
+        def jacobians() -> list[Tensor]:
+            return [self._jacobian(number, at, roots[number], felt[number]) for number in range(len(roots))]
+
+        return LinearSystem(self, jacobians, ScaledResiduals(roots, at.values), roots, at.affine, felt)
+
+    def _jacobian(self, number: int, at: Evaluation, root: Tensor, chosen: Tensor | None) -> Tensor:
+        """(m, K, n) of a term, of all its elements or of some, times their roots."""
+        if chosen is not None and not len(chosen):
+            compiled, values = self.compiled[number], at.values[number]
+            return values.new_zeros(values.shape[1], sum(compiled.widths), 0)
+        return self._masked(number, _scaled(at.arguments[number], root, chosen), chosen)
 
     def _masked(self, number: int, jacobian: Tensor, chosen: Tensor | None) -> Tensor:
         """The Jacobians of a term with zero columns at fixed unknowns."""

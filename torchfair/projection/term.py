@@ -112,10 +112,12 @@ class ElementTerm:
         n, m = residuals.shape
         if root.shape not in ((n,), (n, m, m)):
             raise ShapeError(f"term '{self.name}', root of its loss", f"({n},) or ({n}, {m}, {m})", tuple(root.shape))
-        weights = torch.full_like(residuals[:, 0], self.weight)
+        weights = residuals.new_full((1,), self.weight)
         if self.element_weights is not None:
-            weights = weights * self.element_weights
-        return apply_root(weights.sqrt(), root)
+            return apply_root((weights * self.element_weights).sqrt(), root)
+        if n and root.stride() == (0,):
+            return (weights.sqrt() * root[:1]).expand(n)  # one number for all, kept once
+        return apply_root(weights.sqrt().expand(n), root)
 
     def values(self, arguments: Sequence[Tensor]) -> Tensor:
         """Residuals ``(n, m)``."""

@@ -11,8 +11,9 @@ from .problem import Problem
 from .result import IterationRecord, ProjectionResult, Status, TermResidual
 from .stopwatch import Stopwatch
 
-_NOT_EVALUATED = "its merit was not evaluated"
-_LARGE = 300_000  # unknowns: evaluating them takes seconds, in which whoever pressed Ctrl-C waits
+_NOT_EVALUATED = f"{Status.INTERRUPTED.value}; its merit was not evaluated"
+_NO_SOLVER = "none"
+_LARGE = 300_000  # unknowns
 
 
 def unbegun(problem: Problem, blocks: State, watch: Stopwatch) -> list[ProjectionResult]:
@@ -22,29 +23,41 @@ def unbegun(problem: Problem, blocks: State, watch: Stopwatch) -> list[Projectio
     large; the message says so.
     """
     layout = problem.layout
-    start = {name: block.detach().clone() for name, block in blocks.items()}
     tables: list[list[TermResidual]] = [[] for _ in range(layout.members)]
-    merits, message = [math.nan] * layout.members, f"{Status.INTERRUPTED.value}; {_NOT_EVALUATED}"
-    if sum(block.numel() for block in start.values()) < _LARGE:
+    merits, message = [math.nan] * layout.members, _NOT_EVALUATED
+    if not is_large(blocks):
         with suppress(KeyboardInterrupt):
-            evaluation = problem.structure.evaluate(start)
+            evaluation = problem.structure.evaluate({name: block.detach().clone() for name, block in blocks.items()})
             tables = residual_tables(problem.structure, problem.terms, evaluation)
             merits, message = evaluation.merits.tolist(), Status.INTERRUPTED.value
-    views = {name: block.view(layout.members, -1, block.shape[1]) for name, block in start.items()}
+    views = {name: block.detach().view(layout.members, -1, block.shape[1]) for name, block in blocks.items()}
     return [
-        ProjectionResult(
-            blocks={name: view[member].clone() for name, view in views.items()},
-            status=Status.INTERRUPTED,
-            message=message,
-            residuals=table,
-            initial_residuals=table,
-            history=[_record(merit, watch.elapsed)],
-            solver=problem.solver.name,
-            timings={"total": watch.elapsed},
-        )
+        _result({name: view[member] for name, view in views.items()}, merit, table, message, problem.solver.name, watch)
         for member, (table, merit) in enumerate(zip(tables, merits, strict=True))
     ]
 
 
-def _record(merit: float, elapsed: float) -> IterationRecord:
-    return IterationRecord(0, merit, math.nan, math.nan, 0.0, math.nan, True, 0, elapsed)
+def not_set_up(blocks: State, watch: Stopwatch) -> ProjectionResult:
+    """The start of one large problem that was not even compiled; of a solver none is named."""
+    return _result(blocks, math.nan, [], _NOT_EVALUATED, _NO_SOLVER, watch)
+
+
+def is_large(blocks: State) -> bool:
+    """Whether compiling a problem, or evaluating it, takes seconds in which whoever pressed Ctrl-C waits."""
+    return sum(block.numel() for block in blocks.values()) >= _LARGE
+
+
+def _result(
+    blocks: State, merit: float, table: list[TermResidual], message: str, solver: str, watch: Stopwatch
+) -> ProjectionResult:
+    record = IterationRecord(0, merit, math.nan, math.nan, 0.0, math.nan, True, 0, watch.elapsed)
+    return ProjectionResult(
+        blocks={name: block.detach().clone() for name, block in blocks.items()},
+        status=Status.INTERRUPTED,
+        message=message,
+        residuals=table,
+        initial_residuals=table,
+        history=[record],
+        solver=solver,
+        timings={"total": watch.elapsed},
+    )

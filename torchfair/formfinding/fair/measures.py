@@ -10,7 +10,8 @@ import torch
 from torch import Tensor
 
 from ..._names import few_groups, sentence
-from ...energies import angle_variation, normal_variation, total_absolute_curvature, total_mean_curvature
+from ...energies import normal_variation, total_absolute_curvature
+from ...energies.angle_variation import lengths_times_angles
 from ...geometry import corner_angles, edge_lengths, face_areas, face_normals
 from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
@@ -55,13 +56,17 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
     turned = (normals * (normals if is_start else face_normals(start, topology))).sum(1)
     strayed = vertices.new_zeros(0) if problem.boundary is None else problem.boundary.distances(normalised)
     warps, sides = planarity(vertices, topology), problem.bounds.sides.shares(normalised, topology)
+    bends = lengths_times_angles(vertices, topology)
+    angle_variation, mean_curvature = (
+        float(topology.sum_per_mesh(part, "interior_edges")) for part in (bends.abs(), bends / 2)
+    )
     energy, curvature = (
         float(quantity(vertices, topology)) for quantity in (normal_variation, total_absolute_curvature)
     )
     return {
         "normal_variation": energy,
-        "angle_variation": float(angle_variation(vertices, topology)),
-        "total_mean_curvature": float(total_mean_curvature(vertices, topology)),
+        "angle_variation": angle_variation,
+        "total_mean_curvature": mean_curvature,
         "total_absolute_curvature": curvature,
         "energy_over_curvature": energy / curvature if curvature > 0.0 else math.nan,
         "area": float(areas.sum()),

@@ -42,6 +42,7 @@ class Nearness:
         limit: Largest distance, normalised; None for no limit.
         input_edge: Mean edge length of the input, normalised.
         notes: Where decisions are told, in words.
+        surface: The reference, where closest points on it have been made ready already.
 
     Attributes:
         points: (n, 3) points on it: its vertices; of a function those nearest to the vertices and to the centres of the
@@ -63,11 +64,13 @@ class Nearness:
         limit: float | None,
         input_edge: float,
         notes: list[str],
+        surface: Reference | None = None,
     ) -> None:
         self._vertices, self._pulls, self._boundary = vertices, pulls, boundary
         self._used = topology.valences > 0
         self.limit, self._input_edge, self._notes = limit, input_edge, notes
         self._reference, self._is_start = reference, isinstance(reference, tuple) and reference[0] is vertices
+        self._made = surface
         self.design_mode = False
         self.forget()
         if self._is_start:  # the surface is made once something leaves it
@@ -81,6 +84,8 @@ class Nearness:
     @cached_property
     def surface(self) -> Reference:
         """With closest points; of the start itself it is made when first asked for."""
+        if self._made is not None:
+            return self._made
         with phase("preparing the reference surface"):
             return surface_of(self._reference)
 

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from ...constraints import lifted_normal_variation_blocks
+from ...geometry.reference import Reference
 from ...projection import ElementTerm, ProjectionSettings
 from ...projection.layout import State
 from ...settings.fair_settings import FairSettings
@@ -48,6 +49,7 @@ class FairProblem:
         rim: Curves along boundary and creases, normalised; by default those of the start.
         input_edge: Mean edge length of the input, in which the distance limit is given; that of the start is 1.
         near_input: Whether the reference is the input; by default where none is given.
+        surface: The reference, where closest points on it have been made ready already.
 
     Attributes:
         near: Closeness to the reference surface.
@@ -76,6 +78,7 @@ class FairProblem:
         rim: FeatureCurves | None = None,
         input_edge: float = 1.0,
         near_input: bool | None = None,
+        surface: Reference | None = None,
     ) -> None:
         self.vertices, self.topology, self.pulls, self.settings = vertices, topology, pulls, settings
         self.notes: list[str] = []
@@ -90,9 +93,9 @@ class FairProblem:
         self.loose = self._loose_corners()
         self.boundary = self._gliding_boundary()
         self.most_warped, self.distance_for_planarity = math.inf, 0.0
-        self.near = self._nearness(reference or (vertices, topology))
+        self.near = self._nearness(reference or (vertices, topology), surface)
 
-    def _nearness(self, reference: GivenReference) -> Nearness:
+    def _nearness(self, reference: GivenReference, surface: Reference | None = None) -> Nearness:
         limit = self.settings.distance_limit
         return Nearness(
             self.vertices,
@@ -103,6 +106,7 @@ class FairProblem:
             limit=None if limit is None else limit * self.input_edge,
             input_edge=self.input_edge,
             notes=self.notes,
+            surface=surface,
         )
 
     def take_reference(self, reference: GivenReference) -> None:

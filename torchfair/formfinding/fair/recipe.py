@@ -10,12 +10,14 @@ import torch
 from torch import Tensor
 
 from ...errors import SettingsError
+from ...progress import phase
 from ...projection import Callback, ProjectionResult
 from ...projection.layout import State
 from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
-from ..references import GivenReference, normalised_reference, refuse_far_reference
+from ..references import GivenReference, normalised_reference, refuse_far_reference, surface_of
+from ..stopping import interrupted_at_the_start
 from .feature_curves import FeatureCurves, feature_curves
 from .measures import fair_measures, fair_promises, located
 from .plan import FairPlan
@@ -55,8 +57,11 @@ class FairRecipe(Recipe[FairSettings]):
     ) -> None:
         super().__init__(vertices, topology, settings or FairSettings())
         surface = None if reference is None else normalised_reference(reference, self.unit)
-        if surface is not None and input_edge is None:
-            refuse_far_reference(surface, self.start, self.topology, most=self.settings.reference_distance)
+        made = None
+        if surface is not None and input_edge is None and self.settings.reference_distance < math.inf:
+            with phase("preparing the reference surface"):
+                made = surface_of(surface)
+            refuse_far_reference(surface, made, self.start, self.topology, most=self.settings.reference_distance)
         self.reference = reference or (self.given, self.topology)
         self.rim = rim or feature_curves(self.given, self.topology, self.settings)
         self.input_edge = input_edge or self.unit.length
@@ -69,6 +74,7 @@ class FairRecipe(Recipe[FairSettings]):
             rim=self.rim.mapped(self.unit.apply),
             input_edge=self.input_edge / self.unit.length,
             near_input=near_input,
+            surface=made,
         )
         self.notes = self.problem.notes
         self.fix(fixed, handles or {})
@@ -150,6 +156,10 @@ class FairRecipe(Recipe[FairSettings]):
     def after(self, vertices: Tensor, before: dict[str, float]) -> dict[str, float]:
         """A start that was not moved has its own measures, and is not measured again."""
         return dict(before) if torch.equal(vertices, self.given) else self.measures(vertices)
+
+    def is_untouched(self, state: State, runs: Sequence[ProjectionResult]) -> bool:
+        """Where it was stopped before a step was taken; boundary vertices are then not put on their curves either."""
+        return interrupted_at_the_start(runs) and torch.equal(state["vertices"], self.start)
 
     def promises(self, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
         """See ``fair_promises``."""

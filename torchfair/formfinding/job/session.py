@@ -18,6 +18,7 @@ from ...progress import phase
 from ...projection import Callback, ProjectionResult, Status
 from ...projection.layout import State
 from ...projection.stopwatch import Stopwatch
+from ...projection.unbegun import is_large, not_set_up
 from ..handles import vertex_numbers
 from ..stopping import interrupted, stopped
 from .compiled_problems import CompiledProblems
@@ -223,6 +224,9 @@ class Session(Generic[R]):
                 return
 
     def _run(self, stage: Stage, watch: Stopwatch) -> ProjectionResult:
+        with deferred_interrupts() as interrupts:
+            if is_large(stage.blocks) and interrupts.taken():
+                return not_set_up(stage.blocks, Stopwatch())  # nothing would be made of it
         hand_back_free_memory(self.recipe.start.numel())
         limit, settings = self.recipe.settings.projection.time_limit, stage.settings
         if limit is not None:
