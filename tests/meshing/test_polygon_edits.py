@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from helpers import grid_faces
@@ -92,6 +94,42 @@ def test_merging() -> None:
     found.drop_straight_nodes(0)
     assert len(found.faces[0]) < 6  # corners of the grid that are used by this face only
     assert is_disk(found)
+
+
+def test_collapses_that_turn_edges_too_far_are_refused() -> None:
+    """A row 0.2 from the boundary: edges across are not turned by a collapse, those along it by 11.3 degrees."""
+    positions, faces, outer = grid()
+    positions[4:8, 0] = 0.2
+    found = PolygonEdits(positions, faces, outer, np.zeros(16, bool))
+    assert not found.collapse((5, 1), math.radians(11.2))
+    assert found.faces == dict(enumerate(faces))
+    assert found.collapse((5, 1), math.radians(11.4))
+    assert found.directions.turn(1, 6, 6) == pytest.approx(math.atan(0.2))  # seen from the first direction
+    assert found.directions.turn(1, 6, 2) == pytest.approx(0)
+
+
+def test_of_two_ends_the_one_stays_for_which_less_turns() -> None:
+    """Two lines end beside each other on the boundary; one is straight, if the other moves, twice as long."""
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [1.1, 0, 0], [2, 0, 0], [2, 2, 0], [1.1, 2, 0], [1, 1, 0], [0, 1, 0]])
+    faces = [[0, 1, 6, 7], [1, 2, 5, 6], [2, 3, 4, 5]]
+    for order in ((1, 2), (2, 1)):
+        found = PolygonEdits(positions, faces, np.arange(8) < 4, np.zeros(8, bool))
+        assert found.collapse(order, math.radians(4))
+        assert found.place_of(2) == 1
+
+
+@pytest.mark.parametrize(("side", "stays"), [(0.25, True), (0.18, False), (0.32, True)])
+def test_short_edges_stay_where_others_would_turn_by_too_much(side: float, stays: bool) -> None:
+    """Squares around (1, 1), of the last of which the boundary leaves a triangle."""
+    flat: list[list[float]] = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [1 + side, 1], [0, 2], [1, 2]]
+    positions = np.array([[x, y, 0] for x, y in flat])
+    faces = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 7]]
+    outer, corner = np.arange(8) != 4, np.isin(np.arange(8), [0, 2, 6])
+    cells = Cells(positions, faces, [[0, 1, 0, 1]] * 4, outer, corner, NO_CREASES)
+    tidied = compact(tidy_boundary(cells, 1.0, 1.0, math.radians(5)))
+    assert ([1, 1, 0] in tidied.positions.tolist()) == stays
+    any_angle = compact(tidy_boundary(cells, 1.0, 1.0))
+    assert ([1, 1, 0] in any_angle.positions.tolist()) == (side > 0.3)
 
 
 @pytest.mark.parametrize("far", [0.0, 1e6])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -34,6 +35,7 @@ _UNTANGLED = 2  # maps, the best first
 _NEARLY = 16  # triangles turned over and branches that are left: with more no second map is tried
 _SHORTEST_RUN = 1.5  # spacings
 _APART = 1.5  # spacings
+_MOST_TURN = math.radians(5.0)  # of edges of quads, where short ones are collapsed at the boundary
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,8 @@ def attempt(
     try:
         cells = trace_cells(found, off_the_lines(found, runs, lines), corners & ~graph.nodes, lines)
         near = spacings[KDTree(frames.centres).query(cells.positions)[1]] if surface.sizes else spacings[:1]
-        whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1)))
+        most = math.inf if lattice.has_rows else _MOST_TURN
+        whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1), most))
         faces, size, shape = whole.faces, len(whole.positions), shape_of(surface.topology)
         verify_creases(verified_topology(faces, size, shape), whole.creases, creases)
         rows = _rows(cells, whole)

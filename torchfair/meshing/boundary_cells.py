@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,55 +12,59 @@ from .polygon_edits import PolygonEdits
 from .tracing import Cells
 
 _SHORT = 0.3  # edges at the boundary, over the spacing
+_SHORTEST = 0.2  # below that edges go even if others turn by more than they may
 _SMALL = 0.08  # area of faces at the boundary, over that of full cells
 _ROUNDS = 8
 
 
-def tidy_boundary(cells: Cells, spacing: float | Floats, area: float | Floats) -> PolygonEdits:
+def tidy_boundary(cells: Cells, spacing: float | Floats, area: float | Floats, most: float = math.inf) -> PolygonEdits:
     """Collapses short edges at the boundary and at creases and joins slivers with neighbours, each change checked.
+
+    Where a collapse would turn an inner edge too far from the line that it lies on, the short edge stays, unless it is
+    very short.
 
     Args:
         cells: of a map.
         spacing: length of edges, also (N,) at the nodes.
         area: of full cells, also (N,).
+        most: radians by which inner edges may turn; by default any angle.
 
     Returns:
         The polygons; positions that no face uses are among theirs.
     """
     faces = [face for face in cells.faces if len(face) > 2]  # bulges of the boundary over one line
     edits = PolygonEdits(cells.positions, faces, cells.on_boundary, cells.fixed, cells.creases)
-    shortest = np.broadcast_to(_SHORT * np.asarray(spacing), len(cells.positions))
-    smallest = np.broadcast_to(_SMALL * np.asarray(area), len(cells.positions))
+    lengths, areas = (np.broadcast_to(np.asarray(of, np.float64), len(cells.positions)) for of in (spacing, area))
     for _ in range(_ROUNDS):
         for number in edits.curve_faces():
             edits.drop_straight_nodes(number)
-        if not _collapse_short(edits, shortest) + _join_small(edits, smallest):
+        if not _collapse_short(edits, lengths, most) + _join_small(edits, areas):
             break
     return edits
 
 
-def _collapse_short(edits: PolygonEdits, shortest: Floats) -> int:
+def _collapse_short(edits: PolygonEdits, lengths: Floats, most: float) -> int:
     """Collapses edges at curves below a length, the shortest first."""
 
     def share(edge: tuple[int, int]) -> float:
-        return edits.length(edge) / float(shortest[list(edge)].min())
+        return edits.length(edge) / float(lengths[list(edge)].min())
 
     sides = {(min(edge), max(edge)) for number in edits.curve_faces() for edge in edits.sides(number)}
     shares = sorted((share((a, b)), (a, b)) for a, b in sides if edits.on_curve[a] or edits.on_curve[b])
     done = 0
     for before, (a, b) in shares:
-        if before >= 1:
+        if before >= _SHORT:
             break
-        if edits.around.get(a) and edits.around.get(b) and share((a, b)) < 1:
-            done += edits.collapse((a, b))
+        if edits.around.get(a) and edits.around.get(b) and (now := share((a, b))) < _SHORT:
+            done += edits.collapse((a, b), most if now >= _SHORTEST else math.inf)
     return done
 
 
-def _join_small(edits: PolygonEdits, smallest: Floats) -> int:
+def _join_small(edits: PolygonEdits, areas: Floats) -> int:
     """Joins faces at curves below an area with the neighbour across their longest side, or collapses their shortest."""
     done = 0
     for number in sorted(edits.curve_faces(), key=edits.area):
-        if number not in edits.faces or edits.area(number) >= smallest[edits.faces[number]].min():
+        if number not in edits.faces or edits.area(number) >= _SMALL * areas[edits.faces[number]].min():
             continue
         sides = sorted(edits.sides(number), key=edits.length)
         inner = [edge for edge in sides if edits.across(edge, number) is not None]

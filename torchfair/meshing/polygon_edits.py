@@ -2,98 +2,51 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterator
+import math
 
 import numpy as np
 
-from ..fields.frames import Bools, Floats, Ints
 from .polygon_area import area_vector
+from .polygon_faces import Edge, PolygonFaces
 
-Edge = tuple[int, int]
+_TURN_DIGITS = 6  # of angles that are compared, so that rounding does not decide
 
 
-class PolygonEdits:
-    """Faces as lists of nodes that change; every change is checked before it is made.
+class PolygonEdits(PolygonFaces):
+    """Faces as lists of nodes that change; every change is checked before it is made."""
 
-    Args:
-        positions: (N, 3), changed in place.
-        faces: nodes counterclockwise, each at least three.
-        on_boundary: (N,) bool.
-        fixed: (N,) bool: nodes that keep their places.
-        creases: (C, 2) nodes of edges that stay edges, such as those along creases; none by default.
-
-    Attributes:
-        on_curve: (N,) bool: nodes on the boundary or on creases.
-        beside: neighbours of nodes along creases.
-    """
-
-    def __init__(
-        self, positions: Floats, faces: list[list[int]], on_boundary: Bools, fixed: Bools, creases: Ints | None = None
-    ) -> None:
-        self.positions, self.on_curve, self.fixed = positions, on_boundary.copy(), fixed
-        self.beside: dict[int, set[int]] = defaultdict(set)
-        for a, b in [] if creases is None else creases.tolist():
-            self.on_curve[[a, b]] = True
-            self.beside[a].add(b)
-            self.beside[b].add(a)
-        self.faces = {number: list(face) for number, face in enumerate(faces)}
-        self.went: dict[int, int] = {}
-        self.around: dict[int, set[int]] = defaultdict(set)
-        for number, face in self.faces.items():
-            for node in face:
-                self.around[node].add(number)
-        self.normals = {number: area_vector(self.positions, face) for number, face in self.faces.items()}
-
-    def place_of(self, node: int) -> int:
-        """The node that a node was collapsed to, itself if it was not."""
-        while node in self.went:
-            node = self.went[node]
-        return node
-
-    def area(self, number: int) -> float:
-        """Of a face, along the normal that it had at first."""
-        first = self.normals[number]
-        size = float(np.linalg.norm(first))
-        return float(area_vector(self.positions, self.faces[number]) @ first) / size if size else 0.0
-
-    def curve_faces(self) -> list[int]:
-        """Faces with a node on the boundary or on a crease."""
-        return [number for number, face in self.faces.items() if self.on_curve[face].any()]
-
-    def sides(self, number: int) -> Iterator[Edge]:
-        """The edges of a face."""
-        face = self.faces[number]
-        return zip(face, face[1:] + face[:1], strict=True)
-
-    def across(self, edge: Edge, number: int) -> int | None:
-        """The face on the other side of an edge of a face; None at the boundary."""
-        others = [f for f in self.around[edge[0]] & self.around[edge[1]] if f != number and self._has(f, edge[::-1])]
-        return others[0] if len(others) == 1 else None
-
-    def _has(self, number: int, edge: Edge) -> bool:
-        return edge in set(self.sides(number))
-
-    def length(self, edge: Edge) -> float:
-        """Of an edge."""
-        return float(np.linalg.norm(self.positions[edge[0]] - self.positions[edge[1]]))
-
-    def collapse(self, edge: Edge) -> bool:
+    def collapse(self, edge: Edge, most: float = math.inf) -> bool:
         """Collapses an edge to the end that is to stay: a fixed one, or one on the boundary or on a crease.
 
         Args:
             edge: two nodes, in either order.
+            most: radians by which an inner edge may have turned from its first direction afterwards. If that is finite,
+                of two ends that may stay it is the one for which less turns.
 
         Returns:
             Whether it is an edge and that left a manifold without faces turned over; otherwise nothing has changed.
         """
-        stays, goes = edge
-        if self._outranks(goes, stays):
-            stays, goes = goes, stays
-        shared = self.around[stays] & self.around[goes]
-        sides = sum(self._has(number, edge) or self._has(number, edge[::-1]) for number in shared)
-        is_curve = sides == 1 or stays in self.beside[goes]
-        if not sides or self.fixed[goes] or (not is_curve and self.on_curve[stays] and self.on_curve[goes]):
+        stays, goes = edge[::-1] if self._outranks(*edge[::-1]) else edge
+        if math.isinf(most):
+            return self._collapse(stays, goes)
+        ways = [(stays, goes), (goes, stays)][: 2 if self._rank(stays) == self._rank(goes) else 1]
+        turned = sorted((round(self._turn(*way), _TURN_DIGITS), k, way) for k, way in enumerate(ways))
+        return any(turn <= most and self._collapse(*way) for turn, _, way in turned)
+
+    def _turn(self, stays: int, goes: int) -> float:
+        """By how much the inner edges of a node that goes are turned at most, radians."""
+        there = self.neighbours(stays)
+        moved = [node for node in self.neighbours(goes) - there - {stays} if not self.is_on_curve((node, goes))]
+        return max((self.directions.turn(node, goes, stays) for node in moved), default=0.0)
+
+    def _collapse(self, stays: int, goes: int) -> bool:
+        edge = stays, goes
+        is_curve = self.is_on_curve(edge)
+        if (
+            not self.faces_at(edge)
+            or self.fixed[goes]
+            or (not is_curve and self.on_curve[stays] and self.on_curve[goes])
+        ):
             return False
         if self.beside[stays] & self.beside[goes] or (self.beside[goes] and stays not in self.beside[goes]):
             return False
@@ -104,11 +57,17 @@ class PolygonEdits:
             if len(set(face)) != len(face):
                 return False
             changed[number] = face if len(face) >= 3 else []
-        return self._allowed(changed) and self._apply(changed, goes, stays)
+        if not self._allowed(changed):
+            return False
+        self.directions.carry(self.neighbours(goes) - self.neighbours(stays) - {stays}, goes, stays)
+        return self._apply(changed, goes, stays)
+
+    def _rank(self, node: int) -> tuple[bool, bool]:
+        return bool(self.fixed[node]), bool(self.on_curve[node])
 
     def _outranks(self, node: int, other: int) -> bool:
         """Whether a node stays rather than another; among equals by geometry, so that numbers do not decide."""
-        ranks = [(bool(self.fixed[of]), bool(self.on_curve[of]), len(self.around[of])) for of in (node, other)]
+        ranks = [(*self._rank(of), len(self.around[of])) for of in (node, other)]
         if ranks[0] != ranks[1]:
             return ranks[0] > ranks[1]
         areas = [sum(sorted(map(self.area, self.around[of]))) for of in (node, other)]

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
+from .alignment import aligned
 from .components import on_surface, read_surface, spacing_of
 from .counts import mesh_to_count
 from .curvature_sizes import CurvatureSizes, curvature_sizes
@@ -82,7 +83,7 @@ def principal_quads(
 
     laid = replace(surface, sizing=sizing) if chosen.adaptive else surface
     pieces, size = mesh_to_count(laid, lattices, size, chosen, count, lambda made: len(made.faces))
-    pieces = on_surface(pieces, surface, chosen)
+    pieces = on_surface(aligned(pieces, surface, size, chosen), surface, chosen)
     faces, positions = pieces.faces, torch.from_numpy(pieces.positions)
     made = verified_topology(faces, len(positions), surface.shape)
     report = measure(positions, made, surface, size, pieces.indices, pieces.creases)

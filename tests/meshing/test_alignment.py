@@ -1,0 +1,118 @@
+"""Edges of coarse meshes turn to the principal directions; faces keep room."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+import pytest
+import torch
+from helpers import grid_faces
+from meshing_tools import Graph, ellipsoid
+from torch import Tensor
+
+from torchfair import Topology
+from torchfair.geometry import corner_angles, face_areas
+from torchfair.meshing import MeshingSettings, QuadMesh, principal_quads
+from torchfair.meshing.face_room import FaceRoom
+from torchfair.shapes import Catenoid, Surface, irregular_triangles
+
+
+class EggCrate(Graph):
+    """Bumps that are two quads wide where 60 are asked for."""
+
+    def height(self, u: Tensor, v: Tensor) -> Tensor:
+        return 0.15 * torch.sin(3 * u) * torch.sin(3 * v)
+
+
+class Slanted(Graph):
+    """A saddle whose principal directions are aslant to all sides."""
+
+    def height(self, u: Tensor, v: Tensor) -> Tensor:
+        return 0.3 * (u**2 - v**2) + 0.4 * u * v
+
+
+def mesh_of(surface: Surface, count: int) -> QuadMesh:
+    made = irregular_triangles(surface, 1200)
+    return principal_quads(made.vertices, made.topology, count=count)
+
+
+def without_moves(surface: Surface, count: int, monkeypatch: pytest.MonkeyPatch) -> QuadMesh:
+    of_quads = sys.modules["torchfair.meshing.principal_quads"]  # the package has a function of that name
+    with monkeypatch.context() as patch:
+        patch.setattr(of_quads, "aligned", lambda pieces, *others: pieces)
+        return mesh_of(surface, count)
+
+
+@pytest.mark.parametrize(("surface", "share"), [(EggCrate(), 0.7), (Slanted(), 1.0), (Catenoid(), 0.4)])
+def test_edges_turn_to_directions(surface: Surface, share: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the mean and 95 %; the lines of the second follow directions exactly, but at the boundary."""
+    moved, start = mesh_of(surface, 120), without_moves(surface, 120, monkeypatch)
+    off = [mesh.report["angle_mean_degrees"] + mesh.report["angle_95_degrees"] / 4 for mesh in (moved, start)]
+    assert off[0] < share * off[1]
+    assert torch.equal(moved.topology.corners, start.topology.corners)
+    outer = start.topology.is_boundary_vertex
+    assert torch.equal(moved.vertices[outer], start.vertices[outer])
+    areas = face_areas(moved.vertices, moved.topology)
+    assert float(areas.min()) > 0.05 * float(areas.mean())
+
+
+def test_singular_points_go_with_their_vertices() -> None:
+    surface, topology = ellipsoid()
+    mesh = principal_quads(surface, topology, count=120)
+    valences = mesh.topology.valences
+    at = (mesh.vertices[:, None] == mesh.singular_points).all(-1).any(1)
+    assert at[valences != 4].all()
+    assert int(at.sum()) == len(mesh.singular_points) == 8
+    assert mesh.report["angle_mean_degrees"] < 0.5
+
+
+def test_moved_vertices_stay_on_the_surface() -> None:
+    made = irregular_triangles(EggCrate(), 1200)
+    flat = principal_quads(made.vertices, made.topology, count=60, settings=MeshingSettings(curved=False))
+    assert float(flat.surface.reference.closest(flat.vertices).distances.max()) < 1e-9
+    curved = mesh_of(EggCrate(), 60).vertices
+    height = 0.15 * torch.sin(3 * curved[:, 0]) * torch.sin(3 * curved[:, 1])
+    assert float((curved[:, 2] - height).abs().max()) < 2e-3
+
+
+def lattice() -> tuple[np.ndarray, Topology]:
+    x, y = np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij")
+    points = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1)
+    return points, Topology.from_faces(torch.from_numpy(np.asarray(grid_faces(4, 4))), 16)
+
+
+@pytest.mark.parametrize(
+    ("to", "is_tight"),
+    [((1.2, 1.2), False), ((0.31, 1.0), False), ((0.2, 1.0), True), ((2.5, 1.0), True), ((1.45, 1.45), False)],
+)
+def test_faces_keep_room(to: tuple[float, float], is_tight: bool) -> None:
+    """One corner of unit squares moves: sides above 0.27, angles from 25 to 185 degrees, none turned over."""
+    points, topology = lattice()
+    moved = points.copy()
+    moved[5, :2] = to
+    tight = FaceRoom.of(topology, points, 1.0).tight(moved)
+    assert tight.any() == is_tight
+    assert tight[5] == is_tight
+    assert not tight[15]
+
+
+def test_angles_and_areas_are_bounded() -> None:
+    points, topology = lattice()
+    room = FaceRoom.of(topology, points, 1.0)
+    sheared = points.copy()
+    sheared[:, 0] += sheared[:, 1] / math.tan(math.radians(24))  # all sides are long, areas are the same
+    assert room.tight(sheared).all()
+    sheared[:, 0] = points[:, 0] + points[:, 1] / math.tan(math.radians(26))
+    assert not room.tight(sheared).any()
+    assert float(corner_angles(torch.from_numpy(sheared), topology).min()) < math.radians(27)
+    flat = points * [1, 0.31, 1]
+    assert not room.tight(flat * [0.35, 1, 1]).any()
+    assert room.tight(flat * [0.31, 1, 1]).any()  # sides 0.31, areas 0.096
+
+
+def test_what_is_tight_at_first_may_stay() -> None:
+    points, topology = lattice()
+    points = points * [1, 0.05, 1]
+    assert not FaceRoom.of(topology, points, 1.0).tight(points).any()
