@@ -96,7 +96,8 @@ class FairSettings:
             quarter of the mean ``l l*``.
         formulation: ``"reduced"`` has the vertices as unknowns, ``"lifted"`` the paper's auxiliary variables too.
         constraint_weight: Weight of half the squared constraints that define the auxiliary variables.
-        projection: Iterations, tolerances, damping and linear solver.
+        projection: Iterations, tolerances, damping and linear solver. From 10 000 vertices on ``"auto"`` is conjugate
+            gradients on triangles, where no flat edges, handles or auxiliary variables are asked for.
     """
 
     energy_weight: float = 1.0

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from ...projection.layout import State
 from ..job.plan import Plan, Stages
+from .iterative import with_solver
 from .panels import PLANAR_PROMISE
 from .problem import FairProblem
 
@@ -105,7 +106,7 @@ class FairPlan(Plan):
             settings = problem.settings.stage() if portions else problem.settings.projection
             if portions and problem.scales.is_large:
                 settings = replace(settings, patience=_LARGE_PATIENCE)
-            yield problem.stage(self.state, share, blur, settings)
+            yield problem.stage(self.state, share, blur, with_solver(settings, problem))
             self.state = problem.blocks(self.state["vertices"])
             placed = problem.placed(self.state)
             if share >= 1.0 and most > 1.0 and not problem.panels.may_become_planar(placed, _HEAVIEST - share):

@@ -146,8 +146,12 @@ class FairProblem:
     # ---- stages ----------------------------------------------------------------------------------------
 
     def stage(self, state: State, share: float, blur: float, settings: ProjectionSettings) -> Stage:
-        """A run of guided projection from ``state`` on; for the others see :meth:`terms`."""
-        return self._stage("fair", state, lambda: self.terms(share, blur), (share, blur), settings)
+        """A run of guided projection from ``state`` on; for the others see :meth:`terms`.
+
+        Live steps of a session keep their own solver, so stages by another one have another name.
+        """
+        name = "fair" if settings.solver == self.settings.projection.solver else f"fair by {settings.solver}"
+        return self._stage(name, state, lambda: self.terms(share, blur), (share, blur), settings)
 
     def shares(self, vertices: Tensor) -> list[float]:
         """How far the constraints that the ``vertices`` (V, 3) violate are imposed, stage after stage; the last is 1.
