@@ -167,7 +167,7 @@ def test_wide_patches_near_the_boundary_mend_what_noise_does_there(name: str) ->
     mesh = irregular_triangles(SURFACES[name], 1500)
     vertices = torch.stack([noisy(mesh, 0.1, "normal", seed) for seed in (1, 2)])
     patches, narrow = Patches(mesh.topology, 4), Patches(mesh.topology, 4)
-    narrow.wide, narrow.wide_places = narrow.groups, narrow.places
+    narrow.wide, narrow.wide_places, narrow.num_rim_groups = narrow.groups, narrow.places, 0
     fits = [fitted_curvature(vertices, mesh.topology, rings=of) for of in (patches, narrow)]
     turned, before = (angles(fit.directions, mesh.principal_directions) for fit in fits)
     edge = distinct(mesh) & mesh.topology.is_boundary_vertex

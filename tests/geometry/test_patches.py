@@ -88,16 +88,19 @@ def test_rings_are_counted(rings: object) -> None:
         Patches(wavy_grid(3, 3)[1], rings)
 
 
-@pytest.mark.parametrize(("rings", "are_wide"), [(2, False), (3, True), (4, True), (5, False)])
-def test_wide_patches_near_the_boundary_and_none_elsewhere(rings: int, are_wide: bool) -> None:
+@pytest.mark.parametrize(("rings", "where"), [(2, "no"), (3, "all"), (4, "all"), (5, "rim"), (8, "no")])
+def test_wide_patches_near_the_boundary_and_none_elsewhere(rings: int, where: str) -> None:
     """Whole rings, the fewest of which have as many members as are wanted; other groups are the same objects."""
     topology = irregular_triangles(Paraboloid(1.0, -1.0), 1000).topology
     patches = Patches(topology, rings)
     step, reach = within(topology, 1).float(), [torch.eye(topology.num_vertices, dtype=torch.bool)]
     for _ in range(3 * rings):
         reach.append(reach[-1].float() @ step > 0)
-    near = reach[rings - 1][:, topology.is_boundary_vertex].any(1)
-    assert patches.border.equal(near if are_wide else torch.zeros_like(near))
+    near, rim = (reach[k][:, topology.is_boundary_vertex].any(1) for k in (rings - 1, 2))
+    assert patches.border.equal({"all": near, "rim": rim, "no": torch.zeros_like(near)}[where])
+    last = patches.wide[len(patches.wide) - patches.num_rim_groups :]
+    centres = torch.cat([group.centres for group in last]) if last else torch.zeros(0).long()
+    assert centres.sort().values.equal((patches.border & rim).nonzero().flatten())
     members: dict[int, set[int]] = {}
     for group in patches.wide:
         assert any(group is other for other in patches.groups) == (not patches.border[group.centres].any())
@@ -107,7 +110,8 @@ def test_wide_patches_near_the_boundary_and_none_elsewhere(rings: int, are_wide:
     lattice = 1 + 3 * rings * (rings + 1)
     for vertex in patches.border.nonzero().flatten()[::7].tolist():
         distance = next(k for k in range(rings) if reach[k][vertex][topology.is_boundary_vertex].any())
-        wanted = min((3 - 2 * distance / rings) * lattice, topology.num_vertices / 10)
+        most, share = (4, 0.2) if distance <= 2 else (3, 0.1)
+        wanted = min((most - (most - 1) * distance / rings) * lattice, share * topology.num_vertices)
         counts = [int(reach[k][vertex].sum()) for k in range(rings + 1, 3 * rings + 1)]
         enough = next((k for k, count in enumerate(counts) if count >= wanted), len(counts) - 1)
         assert members[vertex] == set(reach[rings + 1 + enough][vertex].nonzero().flatten().tolist())
@@ -117,13 +121,15 @@ def test_wide_patches_near_the_boundary_and_none_elsewhere(rings: int, are_wide:
 
 def test_connected_parts_have_the_wide_patches_that_they_have_alone() -> None:
     """A large part has some, and a small one beside it none."""
-    large, small = (irregular_triangles(Paraboloid(1.0, -1.0), count).topology for count in (1000, 300))
+    large, small = (irregular_triangles(Paraboloid(1.0, -1.0), count).topology for count in (1000, 220))
     shifted = [[vertex + large.num_vertices for vertex in face] for face in small.face_lists()]
     both = Patches(Topology.from_faces([*large.face_lists(), *shifted]), 3)
     alone = Patches(large, 3)
     assert alone.border.any()
     assert both.border[: large.num_vertices].equal(alone.border)
     assert not both.border[large.num_vertices :].any()
+    assert both.num_parts == 2
+    assert both.parts.bincount().tolist() == [large.num_vertices, small.num_vertices]
     counts = [torch.zeros(len(patches.border), dtype=torch.int64) for patches in (alone, both)]
     for patches, count in zip((alone, both), counts, strict=True):
         for centres, _, present in patches.wide:

@@ -11,6 +11,7 @@ from torch import Tensor
 from .._side_by_side import side_by_side
 from ._height_rows import NUMBERS_OF_MEMBER, Members, members_of, shares, terms
 from ._ops import gather
+from ._rim_fits import rim_fits
 from .patches import Patches, PatchGroup
 from .tangent_basis import tangent_bases
 
@@ -86,8 +87,9 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     the curvatures as can be told. ``degree`` is 3 or more.
 
     The last fit is over the wide patches near the boundary: of one side alone second derivatives are less certain.
-    There the noise of a coefficient of order k, over the coefficient, falls with the power 2 k of the unit. Orders that
-    are left out count the more; by the power 1.5 k doubts fall less, which has been found to be right.
+    At the rim that is ``rim_fits``. In the others the noise of a coefficient of order k, over the coefficient, falls
+    with the power 2 k of the unit. Orders that are left out count the more; by the power 1.5 k doubts fall less, which
+    has been found to be right.
     """
     frames, least = _frames(normals), _least(degree, normals.device)
     # Matrices of all vertices would take kilobytes for each, so they are made for one group of patches at a time, and
@@ -105,18 +107,20 @@ def fitted_heights(vertices: Tensor, normals: Tensor, patches: Patches, degree: 
     coefficients, spread, variance = (patches.in_order([fit[i] for fit in fits]) for i in range(3))
     scale = patches.in_order([fit.scale for fit in fits]).squeeze(-1)
     fits.clear()
-    variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), degree, patches)
+    noise, variance, doubts = _prior(coefficients, spread, variance.squeeze(-1), scale, degree, patches)
     powers = doubts.new_tensor([_FALL * order for order, _ in terms(degree)[:-_NEEDED]])
 
     def believed_fit(number: int) -> tuple[Tensor, Tensor, Tensor]:
         group, found = patches.wide[number], kept.pop(number, None)
         members = members_of(vertices, normals, frames, group) if found is None else found
-        own, noise, before = (gather(x, group.centres) for x in (doubts, variance[..., None], scale[..., None]))
+        own, around, before = (gather(x, group.centres) for x in (doubts, variance[..., None], scale[..., None]))
         size = before / members.scale[..., None]  # one, but for wide patches
-        own, noise = own * size**powers, (noise * size.square()).squeeze(-1)
-        return *_believed_fit(members, least, own, noise, degree), members.scale[..., None]
+        own, around = own * size**powers, (around * size.square()).squeeze(-1)
+        return *_believed_fit(members, least, own, around, degree), members.scale[..., None]
 
-    believed = side_by_side(believed_fit, range(len(patches.wide)), vertices)
+    believed = side_by_side(believed_fit, range(len(patches.wide) - patches.num_rim_groups), vertices)
+    if patches.num_rim_groups:
+        believed.append(rim_fits(vertices, normals, frames, noise, patches))
     coefficients, uncertainty = (patches.in_order([fit[i] for fit in believed], wide=True) for i in range(2))
     scale = patches.in_order([fit[2] for fit in believed], wide=True, elsewhere=1.0)
     return Heights(frames, scale.squeeze(-1), coefficients, uncertainty.squeeze(-1))
@@ -207,27 +211,38 @@ def _variance(left: Tensor, square: Tensor, total: Tensor, used: Tensor) -> Tens
 
 
 def _prior(
-    coefficients: Tensor, spread: Tensor, variance: Tensor, degree: int, patches: Patches
-) -> tuple[Tensor, Tensor]:
-    """Variance of the noise (*batch, V), pooled, and its ratio to that of each high coefficient (*batch, V, p - 6).
+    coefficients: Tensor, spread: Tensor, variance: Tensor, scale: Tensor, degree: int, patches: Patches
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Variance of the noise, pooled, and its ratio to that of each high coefficient.
 
     Args:
         coefficients: (*batch, V, p - 6) of the plain fit, of the terms above the second order.
         spread: (*batch, V, p - 6) their variance per variance of the noise.
         variance: (*batch, V) of the noise, by the remainders of the plain fit.
+        scale: (*batch, V) unit of all these.
         degree: of the polynomials, 3 or more.
         patches: over which all is pooled, vertices with certain coefficients first.
+
+    Returns:
+        (*batch, V) the variance, square of the unit of the vertices; (*batch, V) the same in units of the patches, of
+        those around, too; and (*batch, V, p - 6) the ratios.
     """
     high, weighed = range(3, degree + 1), list(zip(terms(degree), shares(degree), strict=True))[:-_NEEDED]
     masks = spread.new_tensor([[share * (order == k) for k in high] for (order, _), share in weighed])
     noise = spread @ masks  # per unit of variance, (*batch, V, orders)
     noise = torch.where(noise > 0.0, noise, 1.0)  # where there is no patch
     found = coefficients.square() @ masks
-    pooled = torch.cat([variance[..., None], found / noise, 1.0 / noise], dim=-1)
+    absolute = (variance * scale.square())[..., None]
+    pooled = torch.cat([absolute, variance[..., None], found / noise, 1.0 / noise], dim=-1)
     for _ in range(_POOLING):
         pooled = patches.means(pooled)
-    variance, found, certain = pooled[..., :1], pooled[..., 1 : 1 + len(high)], pooled[..., 1 + len(high) :]
+    absolute, variance, found, certain = (
+        pooled[..., :1],
+        pooled[..., 1:2],
+        pooled[..., 2 : 2 + len(high)],
+        pooled[..., 2 + len(high) :],
+    )
     count = spread.new_tensor([order + 1.0 for order in high])
     signal = torch.maximum(found - variance, variance / _MOST_DOUBT) / certain / count
     ratio = torch.where(signal > 0.0, variance / torch.where(signal > 0.0, signal, 1.0), 0.0)
-    return variance.squeeze(-1), ratio @ masks.T
+    return absolute.squeeze(-1), variance.squeeze(-1), ratio @ masks.T

@@ -57,16 +57,16 @@ class Members(NamedTuple):
         return torch.stack([*reversed(_monomials(root, x, y, degree)), root * z], dim=-2)
 
 
-def members_of(vertices: Tensor, normals: Tensor, frames: Tensor, group: PatchGroup) -> Members:
+def members_of(vertices: Tensor, normals: Tensor, frames: Tensor, group: PatchGroup, *, facing: float = 1.0) -> Members:
     """Members of a group over the planes of ``frames`` (*batch, V, 3, 3), two tangents and the normal.
 
     Near members count more than far ones, by a Gaussian of the distance. Those whose ``normals`` (*batch, V, 3) turn
-    away count less, by the square of the cosine, not at all beyond 90 degrees.
+    away count less, by the power ``2 facing`` of the cosine, not at all beyond 90 degrees.
     """
     centres, members, present = group
     apart = (gather(vertices, members) - gather(vertices, centres)[..., None, :]).double()
-    facing = (gather(normals, members) @ gather(normals, centres)[..., None]).squeeze(-1).double()
-    roots = facing.clamp_min(0.0) * present
+    cosines = (gather(normals, members) @ gather(normals, centres)[..., None]).squeeze(-1).double().clamp_min(0.0)
+    roots = (cosines if facing == 1.0 else cosines**facing) * present
     places = frames.index_select(-3, centres) @ apart.mT
     x, y, z = places.unbind(-2)
     distance = x * x + y * y + z * z

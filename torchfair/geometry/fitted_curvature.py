@@ -112,7 +112,8 @@ def fitted_curvature(
     vertices within some rings of edges (osculating jets: Cazals and Pouget, *Estimating differential quantities using
     polynomial fitting of osculating jets*, 2005). The plane is that of a quadratic fit before. Terms of the third
     and fourth degree are weighed by how far they stand out of the noise of the mesh: they follow curvatures that
-    change, up to the boundary, and do not follow the noise. From three rings on, patches near the boundary are wider.
+    change, up to the boundary, and do not follow the noise. From three rings on, patches near the boundary are wider,
+    and within two rings of it polynomials are of degree six, where each term is weighed in the principal directions.
 
     Without noise the error of operators is nearly of the third order in the edge length, on irregular meshes too.
     Creases are rounded over the rings.

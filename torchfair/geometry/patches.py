@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 Ints = npt.NDArray[np.int64]
 
 _FEW, _ENOUGH = 0.8, 1.25  # of the vertices that the rings of a triangular lattice have
-_NOISY, _WIDE = 3, 3.0  # rings from which on there are wide patches; their vertices over those of the lattice
-_SHARE = 0.1  # of the vertices of a connected part, as many as wide patches want at most
+_NOISY = 3  # rings from which on there are wide patches
+_WIDE, _RIM_WIDE = 3.0, 4.0  # their vertices at the boundary over those of the lattice
+_SHARE, _RIM_SHARE = 0.1, 0.2  # of the vertices of a connected part, as many as wide patches want at most
+_RIM = 2  # rings
 _PAIRS = 1 << 15  # of a vertex and a member at once: what is made of them stays near the cache
 
 
@@ -49,9 +51,10 @@ class Patches:
     a topology; they hold no positions.
 
     From three rings on, vertices that are fewer rings from the boundary have wide patches, too: of three times as many
-    vertices as the lattice at the boundary, evenly less further inside, and at most three times as many rings. They
-    want no more than a tenth of the vertices of a connected part, as polynomials do not follow shapes of that size, and
-    parts have none where narrow patches are as large.
+    vertices as the lattice at the boundary, evenly less further inside, and at most three times as many rings. Within
+    two rings, at the rim, they are of four times as many. They want no more than a tenth of the vertices of a connected
+    part, a fifth at the rim, as polynomials do not follow shapes of that size, and there are none where narrow patches
+    are as large.
 
     Args:
         topology: any polygon mesh.
@@ -68,8 +71,11 @@ class Patches:
         groups: all patches, those without wide ones first, and small ones before larger ones in both.
         places: (V,) of each vertex in the groups one after the other; behind the last where it has no patch.
         wide: the groups again, with wide patches in place of narrow ones; those without are the same objects.
+        num_rim_groups: how many of them, the last, are of wide patches within two rings of the boundary.
         wide_places: (V,) of each vertex in them.
         border: (V,) whether there is a wide patch of the vertex.
+        parts: (V,) number of the connected part that the vertex is in.
+        num_parts: how many there are.
     """
 
     def __init__(self, topology: Topology, rings: int, *, at: Tensor | None = None) -> None:
@@ -84,14 +90,19 @@ class Patches:
             lattice = 1 + 3 * self.rings * (self.rings + 1)
             few = np.flatnonzero(np.diff(exact.indptr) < _FEW * lattice)
             grown = _grown(exact[few], step, np.full(len(few), _ENOUGH * lattice), self.rings)
-            border, wanted = _border(topology, step, centres, self.rings)
+            self.num_parts, parts = _parts(step)
+            rim, inner, wanted = _border(topology, step, parts, centres, self.rings)
+            border = np.concatenate([inner, rim])
             narrow = _replaced(exact, few, grown)
             wide = _replaced(narrow, border, _grown(exact[border], step, wanted, 2 * self.rings))
-            shared = _grouped(narrow, centres, np.setdiff1d(np.arange(len(centres)), border), topology.device)
-            self.groups = [*shared, *_grouped(narrow, centres, border, topology.device)]
-            self.wide = [*shared, *_grouped(wide, centres, border, topology.device)]
+            others = np.setdiff1d(np.arange(len(centres)), border)
+            shared, *inside = (_grouped(narrow, centres, some, topology.device) for some in (others, inner, rim))
+            near, last = (_grouped(wide, centres, some, topology.device) for some in (inner, rim))
+            self.groups, self.wide = [*shared, *inside[0], *inside[1]], [*shared, *near, *last]
+            self.num_rim_groups = len(last)
             count = topology.num_vertices
             self.places, self.wide_places = _places(self.groups, count), _places(self.wide, count)
+            self.parts = torch.from_numpy(parts).to(topology.device)
             self.border = torch.from_numpy(np.isin(np.arange(count), centres[border])).to(topology.device)
 
     def means(self, values: Tensor) -> Tensor:
@@ -195,21 +206,31 @@ def _replaced(matrix: sp.csr_array, rows: Ints, by: sp.csr_array) -> sp.csr_arra
     return whole
 
 
-def _border(topology: Topology, step: sp.csr_array, centres: Ints, rings: int) -> tuple[Ints, npt.NDArray[np.float64]]:
-    """Which of the centres (n,) have wide patches (m,), and how many vertices these are to have (m,)."""
+def _parts(step: sp.csr_array) -> tuple[int, Ints]:
+    """Number of connected parts, and (V,) which of them each vertex is in."""
     from scipy.sparse.csgraph import connected_components
 
+    count, parts = connected_components(step, directed=False)
+    return int(count), parts.astype(np.int64)
+
+
+def _border(
+    topology: Topology, step: sp.csr_array, parts: Ints, centres: Ints, rings: int
+) -> tuple[Ints, Ints, npt.NDArray[np.float64]]:
+    """Which of the centres have wide patches, at the rim and further inside, and how many these want, inner first."""
     if rings < _NOISY:
-        return np.zeros(0, np.int64), np.zeros(0)
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
     near = topology.is_boundary_vertex.cpu().numpy()
     distance = np.where(near, 0, rings)
     for ring in range(1, rings):
         wider = step @ near
         distance[wider & ~near] = ring
         near = wider
-    parts = connected_components(step, directed=False)[1]
-    most = _SHARE * np.bincount(parts)[parts]
+    at_rim = distance <= _RIM
+    most = np.where(at_rim, _RIM_SHARE, _SHARE) * np.bincount(parts)[parts]
     lattice = 1 + 3 * rings * (rings + 1)
-    rows = np.flatnonzero(((distance < rings) & (most > _ENOUGH * lattice))[centres])
-    wanted = (_WIDE - (_WIDE - 1.0) * distance[centres[rows]] / rings) * lattice
-    return rows, np.minimum(wanted, most[centres[rows]])
+    wide = np.where(at_rim, _RIM_WIDE, _WIDE)
+    wanted = np.minimum((wide - (wide - 1.0) * distance / rings) * lattice, most)[centres]
+    is_wide, at_rim = ((distance < rings) & (most > _ENOUGH * lattice))[centres], at_rim[centres]
+    rim, inner = np.flatnonzero(is_wide & at_rim), np.flatnonzero(is_wide & ~at_rim)
+    return rim, inner, wanted[np.concatenate([inner, rim])]
