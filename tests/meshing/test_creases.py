@@ -15,8 +15,9 @@ from torchfair import MeshError, Topology
 from torchfair._graph import connected
 from torchfair.creases import crease_edges
 from torchfair.fields import FaceFrames
+from torchfair.fields.direction_field import WEAK
 from torchfair.geometry import dihedral_angles, face_areas
-from torchfair.meshing import MeshingSettings, QuadMesh, principal_quads
+from torchfair.meshing import MeshingSettings, QuadMesh, combing, principal_quads
 from torchfair.meshing.bridges import cut_bridges
 from torchfair.meshing.creases import find_creases, sharp_edges
 from torchfair.meshing.mesh_creases import MeshCreases
@@ -237,3 +238,31 @@ def test_the_length_of_creases_does_not_count_how_finely_they_are_cut() -> None:
     assert MeshCreases(none, ends).length == pytest.approx(7.0)
     assert MeshCreases(none, halves).length == pytest.approx(7.0)
     assert MeshCreases(none, ends[:0]).length == 0.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_axes_of_bodies_without_a_longest_one_run_along_creases(seed: int) -> None:
+    """Of all directions that of an edge of the cube; of a plane the nearest to one; whatever the basis is."""
+    vertices, topology = box(4)
+    turn, basis = random_rotation(seed).numpy(), random_rotation(seed + 5).numpy()
+    turned = vertices @ torch.from_numpy(turn.T)
+    frames = FaceFrames.of(turned, topology)
+    creases = find_creases(frames, sharp_edges(turned, topology, SHARP), SHARP, 0.0)
+    axis = combing._among(basis, frames, creases)
+    assert sorted(np.abs(axis @ turn)) == pytest.approx([0, 0, 1], abs=1e-12)
+    assert np.abs(axis @ combing._among(turn, frames, creases)) == pytest.approx(1, abs=1e-12)
+    plane = turn @ np.array([[1.0, 0, 0], [0, 0.8, 0.6]]).T  # holds the first edge of the cube
+    assert np.abs(combing._among(plane, frames, creases) @ turn[:, 0]) == pytest.approx(1, abs=1e-12)
+
+
+def test_meshes_of_cubes_are_chosen_by_no_rounding() -> None:
+    """Moments that differ in their last digits say nothing."""
+    vertices, topology = box(2)
+    axes = []
+    for shift in (0.0, 1e-13, -1e-13):
+        moved = vertices * torch.tensor([1.0, 1.0 + shift, 1.0 + 2 * shift], dtype=torch.float64)
+        frames = FaceFrames.of(moved, topology)
+        creases = find_creases(frames, sharp_edges(moved, topology, SHARP), SHARP, 0.0)
+        pull = combing._along_the_longest_axis(frames, creases)
+        axes.append(pull.weights * np.exp(2j * pull.angles))
+    assert all(np.abs(axis - axes[0]).max() < 1e-9 * WEAK for axis in axes)

@@ -26,6 +26,7 @@ from .even_crosses import even_crosses
 from .node_room import with_room
 
 _FIRM = 10.0  # weight of creases that the field follows
+_ALIKE = 1e-6  # relative difference of moments of inertia that says nothing of what is longest
 
 
 def combed(
@@ -60,7 +61,7 @@ def combed(
         MeshError: if they do anyway, or cannot be made to.
     """
     stay = None if creases is None else creases.corners
-    has_creases = creases is not None and bool(creases.chains)
+    chained = creases if creases is not None and creases.chains else None
     if even:
         angles = _field(frames, directions, smoothing, 4, creases, angle)
         matched = matchings(frames, angles, 4)
@@ -74,7 +75,7 @@ def combed(
     tried: tuple[Symmetry, ...] = (4, 2) if symmetry == 2 else (4,)
     for of in tried:
         graphs = []
-        for pull in (None, _along_the_longest_axis(frames)) if of == 2 and has_creases else (None,):
+        for pull in (None, _along_the_longest_axis(frames, chained)) if of == 2 and chained else (None,):
             angles = (
                 _field(frames, directions, smoothing, of, creases, angle)
                 if pull is None
@@ -123,10 +124,24 @@ def _field(
     return direction_field(frames, directions, smoothing, symmetry, firm)
 
 
-def _along_the_longest_axis(frames: FaceFrames) -> Pull:
+def _along_the_longest_axis(frames: FaceFrames, creases: Creases) -> Pull:
     """Directions of the axis of least inertia in all faces, with small weights."""
     apart = frames.centres - frames.areas @ frames.centres / frames.areas.sum()
-    axis = np.linalg.eigh(apart.T @ (frames.areas[:, None] * apart))[1][:, -1]
+    spread, axes = np.linalg.eigh(apart.T @ (frames.areas[:, None] * apart))
+    longest = axes[:, spread > (1 - _ALIKE) * spread[-1]]
+    axis = longest[:, -1] if longest.shape[1] == 1 else _among(longest, frames, creases)
     faces = np.arange(len(apart))
     seen = frames.seen(np.broadcast_to(axis, apart.shape), faces)
     return Pull(faces, np.angle(seen), WEAK * np.abs(seen) ** 2)
+
+
+def _among(axes: Floats, frames: FaceFrames, creases: Creases) -> Floats:
+    """The unit vector (3,) among those that ``axes`` (3, n) span, as of a cube, that is nearest to a crease.
+
+    The first of the edges that have most along them: rounding must not say where rows run.
+    """
+    first = np.array([chain.vertices[:2] for chain in creases.chains])
+    along = frames.points[first[:, 1]] - frames.points[first[:, 0]]
+    shares = np.linalg.norm(along @ axes, axis=1) / np.linalg.norm(along, axis=1)
+    chosen = axes @ (along[np.argmax(shares > shares.max() - _ALIKE)] @ axes)
+    return np.asarray(chosen / np.linalg.norm(chosen))
