@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from .._side_by_side import side_by_side
+from ._cholesky_root import cholesky_root
 from ._height_rows import NUMBERS_OF_MEMBER, Members, members_of, shares, terms
 from ._ops import gather
 from ._rim_fits import rim_fits
@@ -51,7 +52,7 @@ def fitted_normals(vertices: Tensor, normals: Tensor, patches: Patches) -> Tenso
 
     def slopes(group: PatchGroup) -> Tensor:
         matrix, right, _ = _normal_equations(members_of(vertices, normals, frames, group).rows(2))
-        low = _low_rows(_root(matrix + torch.diag(least)))
+        low = _low_rows(cholesky_root(matrix + torch.diag(least)))
         return (low @ right).squeeze(-1)[..., 1:3]
 
     return turned_normals(frames, patches.in_order(side_by_side(slopes, patches.groups, vertices)))
@@ -147,7 +148,7 @@ def _plain_fit(members: Members, least: Tensor, degree: int) -> _Fit:
     rows = members.rows(degree)
     at_members, heights = rows[..., :-1, :], rows[..., -1, :]
     matrix, right, square = _normal_equations(rows)
-    root = _root(matrix + torch.diag(least))
+    root = cholesky_root(matrix + torch.diag(least))
     inverse_root = torch.linalg.solve_triangular(root, torch.eye(len(least)).to(root), upper=False)
     inverse = inverse_root.mT @ inverse_root
     coefficients = inverse @ right
@@ -171,7 +172,7 @@ def _believed_fit(
     at_members, heights = rows[..., :-1, :], rows[..., -1:, :].mT
     matrix, right, _ = _normal_equations(rows)
     ridge = least + torch.nn.functional.pad(doubts / total[..., None], (0, _NEEDED))
-    root = _root(matrix + torch.diag_embed(ridge))
+    root = cholesky_root(matrix + torch.diag_embed(ridge))
     low = _low_rows(root)
     # Few members leave much to what was added, and equations lose half of the digits: what is left gives them back.
     coefficients = torch.cholesky_solve(right, root)
@@ -187,12 +188,6 @@ def _normal_equations(rows: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Matrix (..., p, p) of terms with terms, right side (..., p, 1) with heights, and mean square (...) of heights."""
     sums = rows @ rows.mT
     return sums[..., :-1, :-1], sums[..., :-1, -1:], sums[..., -1, -1]
-
-
-def _root(matrix: Tensor) -> Tensor:
-    """Lower Cholesky factor; what is added to matrices keeps them far enough from singular ones."""
-    root: Tensor = torch.linalg.cholesky_ex(matrix).L
-    return root
 
 
 def _low_rows(root: Tensor) -> Tensor:

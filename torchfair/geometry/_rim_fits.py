@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from .._side_by_side import side_by_side
+from ._cholesky_root import cholesky_root
 from ._height_rows import members_of, shares, terms
 from ._ops import gather, scatter_sum
 from ._principal_frames import principal_frames
@@ -105,7 +106,7 @@ def _solved(equations: _Equations, variances: Tensor) -> _Solution:
     believed = torch.nn.functional.pad(torch.ones_like(binomials), (0, _LOW))
     matrix = equations.matrix * deviations[..., None] * deviations[..., None, :]
     matrix = matrix + torch.diag_embed(equations.noise[..., None] * believed + _LEAST)
-    root: Tensor = torch.linalg.cholesky_ex(matrix).L
+    root = cholesky_root(matrix)
     return _Solution(root, torch.cholesky_solve((equations.right * deviations)[..., None], root).squeeze(-1))
 
 
