@@ -18,6 +18,7 @@ FLOORS = (
         "_ranges",
         "_reading_words",
         "_staged",
+        "_portions",
         "_tracing",
         "cameras",
         "linear",
