@@ -5,6 +5,7 @@ from __future__ import annotations
 from torch import Tensor
 
 from ..geometry import second_differences, umbrella_vectors, vertex_normals
+from ..geometry._ops import sums_around
 from ..polylines import straight_triples
 from ..projection import ElementTerm
 from ..projection.term import Residual
@@ -66,16 +67,10 @@ def _even_umbrellas(vertices: Tensor, topology: Topology) -> Tensor:
     umbrellas = umbrella_vectors(vertices, topology)
     even = (umbrellas * normals).sum(1, keepdim=True) * normals
     inner = (~topology.is_boundary_vertex)[:, None].to(even.dtype)
-    v, w = topology.edges.unbind(1)
-    count = _around(inner, v, w)
+    count = sums_around(inner, topology.edges)
     for _ in range(_ROUNDS):
-        even = _around(even * inner, v, w) / count.clamp_min(1.0)
+        even = sums_around(even * inner, topology.edges) / count.clamp_min(1.0)
     return even
-
-
-def _around(values: Tensor, v: Tensor, w: Tensor) -> Tensor:
-    """Sum of the values (V, d) of every vertex and its neighbours."""
-    return values.index_add(0, v, values[w]).index_add(0, w, values[v])
 
 
 class EvenFairness(Constraint):

@@ -27,6 +27,12 @@ def scatter_sum(values: Tensor, index: Tensor, size: int) -> Tensor:
     return total
 
 
+def sums_around(values: Tensor, edges: Tensor) -> Tensor:
+    """(V, d) sum of the values (V, d) of every vertex and its neighbours along edges (E, 2)."""
+    v, w = edges.unbind(1)
+    return values.index_add(0, v, values[w]).index_add(0, w, values[v])
+
+
 def cross(a: Tensor, b: Tensor) -> Tensor:
     """Cross product along the last dimension."""
     product: Tensor = torch.linalg.cross(a, b, dim=-1)

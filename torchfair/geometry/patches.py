@@ -74,7 +74,7 @@ class Patches:
         num_rim_groups: how many of them, the last, are of wide patches within two rings of the boundary.
         wide_places: (V,) of each vertex in them.
         border: (V,) whether there is a wide patch of the vertex.
-        parts: (V,) number of the connected part that the vertex is in.
+        parts: (V,) number of the connected part that the vertex is in; below three rings all are one.
         num_parts: how many there are.
     """
 
@@ -85,12 +85,13 @@ class Patches:
             raise ShapeError("at", f"a boolean tensor ({topology.num_vertices},)", f"{tuple(at.shape)} {at.dtype}")
         with torch._C._DisableFuncTorch():  # inside function transforms index tensors have no numbers to read
             step = _step(topology)
-            centres = np.arange(topology.num_vertices) if at is None else np.flatnonzero(at.cpu().numpy())
+            count = topology.num_vertices
+            centres = np.arange(count) if at is None else np.flatnonzero(at.cpu().numpy())
             exact = _within(step, centres, self.rings)
             lattice = 1 + 3 * self.rings * (self.rings + 1)
             few = np.flatnonzero(np.diff(exact.indptr) < _FEW * lattice)
             grown = _grown(exact[few], step, np.full(len(few), _ENOUGH * lattice), self.rings)
-            self.num_parts, parts = _parts(step)
+            self.num_parts, parts = _parts(step) if self.rings >= _NOISY else (1, np.zeros(count, np.int64))
             rim, inner, wanted = _border(topology, step, parts, centres, self.rings)
             border = np.concatenate([inner, rim])
             narrow = _replaced(exact, few, grown)
@@ -100,7 +101,6 @@ class Patches:
             near, last = (_grouped(wide, centres, some, topology.device) for some in (inner, rim))
             self.groups, self.wide = [*shared, *inside[0], *inside[1]], [*shared, *near, *last]
             self.num_rim_groups = len(last)
-            count = topology.num_vertices
             self.places, self.wide_places = _places(self.groups, count), _places(self.wide, count)
             self.parts = torch.from_numpy(parts).to(topology.device)
             self.border = torch.from_numpy(np.isin(np.arange(count), centres[border])).to(topology.device)

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from ..topology import Topology
+from ._ops import sums_around
 from .fitted_curvature import FittedCurvature, fitted_curvature
 from .normals import vertex_normals
 
@@ -31,10 +32,9 @@ def sampled_curvature(vertices: Tensor, topology: Topology) -> FittedCurvature:
     chosen = spread_vertices(topology)
     with torch.no_grad():
         fit = fitted_curvature(vertices, topology, at=chosen)
-        around = _Around(topology)
-        counts = around.sums(around.sums(chosen.to(torch.float64)[:, None]))
+        counts = _within_two(chosen.to(torch.float64)[:, None], topology)
         rows = torch.cat([fit.operators.flatten(1), fit.doubts[:, None], fit.scales[:, None]], 1) * chosen[:, None]
-        rows = around.sums(around.sums(rows)) / counts.clamp_min(1.0)
+        rows = _within_two(rows, topology) / counts.clamp_min(1.0)
         return dataclasses.replace(
             fit,
             normals=vertex_normals(vertices, topology),
@@ -50,29 +50,23 @@ def spread_vertices(topology: Topology) -> Tensor:
     In turn, in an order that is random but always the same, all of those that come first among what is left within two
     edges are taken, and what is within two edges of them is left out (Luby 1986).
     """
-    around = _Around(topology)
-    count = topology.num_vertices
-    rank = torch.randperm(count, generator=torch.Generator().manual_seed(_SEED)).to(topology.device)
+    ends = torch.cat([topology.edges, topology.edges.flip(1)])
+    rank = torch.randperm(topology.num_vertices, generator=torch.Generator().manual_seed(_SEED)).to(topology.device)
     chosen = torch.zeros_like(rank, dtype=torch.bool)
     while bool((rank >= 0).any()):
-        first = (around.largest(around.largest(rank)) == rank) & (rank >= 0)
+        first = (_largest_within_two(rank, ends) == rank) & (rank >= 0)
         chosen |= first
-        rank = torch.where(around.largest(around.largest(first.to(rank))) > 0, -1, rank)
+        rank = torch.where(_largest_within_two(first.to(rank), ends) > 0, -1, rank)
     return chosen
 
 
-class _Around:
-    """Sums and largest values over vertices and their neighbours."""
+def _within_two(values: Tensor, topology: Topology) -> Tensor:
+    """(V, d) sums of values (V, d) over walks of two edges or fewer."""
+    return sums_around(sums_around(values, topology.edges), topology.edges)
 
-    def __init__(self, topology: Topology) -> None:
-        self.ends = torch.cat([topology.edges, topology.edges.flip(1)]).T
 
-    def sums(self, values: Tensor) -> Tensor:
-        """(V, d) of ``values`` (V, d)."""
-        to, of = self.ends
-        return values.index_add(0, to, values.index_select(0, of))
-
-    def largest(self, values: Tensor) -> Tensor:
-        """(V,) of ``values`` (V,)."""
-        to, of = self.ends
-        return values.scatter_reduce(0, to, values[of], "amax")
+def _largest_within_two(values: Tensor, ends: Tensor) -> Tensor:
+    """(V,) largest of the values (V,) within two edges; edges (2 E, 2) in both directions."""
+    for _ in range(2):
+        values = values.scatter_reduce(0, ends[:, 0], values[ends[:, 1]], "amax")
+    return values

@@ -118,8 +118,9 @@ def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis, *,
     from ..principal import LARGE_MISALIGNMENT, principal_edges_from_directions
 
     try:
+        directions, confidence = _sampled_directions(vertices, topology)
         aligned = principal_edges_from_directions(
-            vertices, topology, **_sampled_directions(vertices, topology), allow_exceptions=True
+            vertices, topology, directions, confidence=confidence, allow_exceptions=True
         )
     except TorchfairError:  # stars without a normal, in a whole component
         return [f"{words}, and there are no principal directions to go by: remesh, or mend degenerate faces first"]
@@ -135,13 +136,11 @@ def layout_advice(vertices: Tensor, topology: Topology, diagnosis: Diagnosis, *,
     return advice
 
 
-def _sampled_directions(vertices: Tensor, topology: Topology) -> dict[str, Tensor]:
+def _sampled_directions(vertices: Tensor, topology: Topology) -> tuple[Tensor, Tensor] | tuple[None, None]:
     """Directions of a large mesh and how far they are trusted; nothing for others, where all vertices have fits."""
     if topology.num_vertices < _LARGE:
-        return {}
+        return None, None
     from ..geometry.sampled_curvature import sampled_curvature
-    from ..principal import LEAST_CONFIDENCE
+    from ..principal import fitted_directions
 
-    fit = sampled_curvature(vertices.double(), topology)
-    directions = fit.directions * ~topology.is_boundary_vertex[:, None, None]
-    return {"directions": directions, "confidence": fit.confidence.clamp_min(LEAST_CONFIDENCE)}
+    return fitted_directions(sampled_curvature(vertices.double(), topology), topology)

@@ -6,8 +6,8 @@ others lie symmetrically to them. :class:`PrincipalEdges` says which third that 
 
 from .developable_strips import DevelopableStrips as DevelopableStrips
 from .directions import LARGE_MISALIGNMENT as LARGE_MISALIGNMENT
-from .directions import LEAST_CONFIDENCE as LEAST_CONFIDENCE
 from .directions import AlignedEdges as AlignedEdges
+from .directions import fitted_directions as fitted_directions
 from .directions import misalignment_of as misalignment_of
 from .directions import principal_edges_from_directions as principal_edges_from_directions
 from .labels import principal_edges_from_seed as principal_edges_from_seed

@@ -12,7 +12,7 @@ from torch import Tensor
 from .._names import PlacedError
 from .._side_by_side import side_by_side
 from ..errors import ShapeError, TorchfairError
-from ..geometry import fitted_curvature, star_normals
+from ..geometry import FittedCurvature, fitted_curvature, star_normals
 from ..geometry._ops import cross, gather
 from ..topology import Topology
 from ._families import Differences, Ints, differences, face_components, mark, seams, spread
@@ -24,10 +24,8 @@ Floats = npt.NDArray[np.float64]
 LARGE_MISALIGNMENT = 0.4
 """Radians from which on edges cannot be said to follow directions: crosses at random are pi/8 = 0.39 off."""
 
-LEAST_CONFIDENCE = 1e-6
-"""Of directions that are computed: also on spheres and planes there is a choice."""
-
 _EDGES = 1 << 14  # at once: what is made of them stays near the cache
+_LEAST = 1e-6  # confidence of computed directions: also on spheres and planes there is a choice
 
 
 class AlignedEdges(NamedTuple):
@@ -136,6 +134,18 @@ def misalignment_of(
     return _mean(angles[principal], trust[principal])
 
 
+def fitted_directions(fit: FittedCurvature, topology: Topology) -> tuple[Tensor, Tensor]:
+    """Computed directions (V, 2, 3) that count, none at the boundary, where they are less certain, and confidence (V,).
+
+    Args:
+        fit: at the vertices, or between some of them.
+        topology: connectivity.
+    """
+    directions = fit.directions.clone()
+    directions[topology.is_boundary_vertex] = 0
+    return directions, fit.confidence.clamp_min(_LEAST)
+
+
 class _Crosses(NamedTuple):
     """Directions and how much they count.
 
@@ -164,10 +174,8 @@ def _crosses(vertices: Tensor, topology: Topology, directions: Tensor | None, co
         raise TorchfairError("confidence: some are negative. Use zeros where there is no direction.")
     vertices = vertices.detach().to(torch.float64)
     if directions is None:
-        fitted = fitted_curvature(vertices, topology)
-        directions = fitted.directions.clone()
-        directions[topology.is_boundary_vertex] = 0  # directions there are less certain
-        confidence = fitted.confidence.clamp_min(LEAST_CONFIDENCE) if confidence is None else confidence
+        directions, certain = fitted_directions(fitted_curvature(vertices, topology), topology)
+        confidence = certain if confidence is None else confidence
     directions = directions.detach().to(torch.float64).reshape(count, -1, 3)
     exists = (directions != 0).any(2).any(1).to(torch.float64)
     return _Crosses(directions, exists if confidence is None else exists * confidence.detach().to(torch.float64))
@@ -246,7 +254,7 @@ def _mean(values: Floats, weights: Floats) -> float:
     """Weighted mean of the values that are not NaN; 0 where there are none, or none that count."""
     weights = np.where(np.isnan(values), 0.0, weights)
     total = weights.sum()
-    return float(np.nan_to_num(values) @ weights / total) if total > 2 * LEAST_CONFIDENCE * len(weights) else 0.0
+    return float(np.nan_to_num(values) @ weights / total) if total > 2 * _LEAST * len(weights) else 0.0
 
 
 def _require_directions(topology: Topology, means: Floats, roots: Ints) -> None:

@@ -210,9 +210,9 @@ class LinearSystem:
         return torch.cat(parts if self.affine_residual is None else [*parts, self.affine_residual])
 
     def forget(self) -> None:
-        """Forgets all that large problems can make anew: :meth:`release`, and Jacobians."""
+        """Forgets the matrices, see :meth:`release`, and the Jacobians of large problems."""
+        self.release()
         if are_many(self.structure.num_unknowns):
-            self.release()
             self.__dict__.pop("jacobians", None)
 
     def spare(self) -> None:

@@ -170,7 +170,6 @@ def step(
     lost, heeded, iterations = proposal.lost, proposal.heeded, proposal.iterations
     if best is not None:
         proposal.system.release()
-        state.linearised.system.release()
         state.linearised.system.forget()
         del trials, proposal  # with the factor, before the next Jacobians are made
         hand_back_free_memory(problem.layout.num_unknowns)

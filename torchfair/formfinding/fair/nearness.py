@@ -70,7 +70,8 @@ class Nearness:
         self._used = topology.valences > 0
         self.limit, self._input_edge, self._notes = limit, input_edge, notes
         self._reference, self._is_start = reference, isinstance(reference, tuple) and reference[0] is vertices
-        self._made = surface
+        if surface is not None:
+            self.surface = surface
         self.design_mode = False
         self.forget()
         if self._is_start:  # the surface is made once something leaves it
@@ -84,8 +85,6 @@ class Nearness:
     @cached_property
     def surface(self) -> Reference:
         """With closest points; of the start itself it is made when first asked for."""
-        if self._made is not None:
-            return self._made
         with phase("preparing the reference surface"):
             return surface_of(self._reference)
 
