@@ -14,7 +14,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.geometry import corner_angles, face_areas
-from torchfair.meshing import MeshingSettings, QuadMesh, principal_quads
+from torchfair.meshing import MeshingSettings, QuadMesh, alignment, principal_quads
 from torchfair.meshing.face_room import FaceRoom
 from torchfair.shapes import Catenoid, Surface, irregular_triangles
 
@@ -56,6 +56,30 @@ def test_edges_turn_to_directions(surface: Surface, share: float, monkeypatch: p
     assert torch.equal(moved.vertices[outer], start.vertices[outer])
     areas = face_areas(moved.vertices, moved.topology)
     assert float(areas.min()) > 0.05 * float(areas.mean())
+
+
+def test_all_stay_where_edges_would_turn_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Moves that lower nothing are taken back, the third round with the first."""
+    start, steps = without_moves(EggCrate(), 60, monkeypatch), np.random.default_rng(0)
+    made: list[int] = []
+
+    def worse(points: np.ndarray, *others: object) -> np.ndarray:
+        made.append(len(points))
+        return 0.03 * steps.normal(size=points.shape)
+
+    monkeypatch.setattr(alignment, "_moves", worse)
+    assert torch.equal(mesh_of(EggCrate(), 60).vertices, start.vertices)
+    assert made == 3 * [len(start.vertices)]
+
+
+def test_adaptive_quads_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, settings = irregular_triangles(Catenoid(), 600), MeshingSettings(adaptive=True)
+    found = principal_quads(made.vertices, made.topology, count=60, settings=settings)
+    monkeypatch.delattr(alignment, "_moves")
+    again = principal_quads(made.vertices, made.topology, count=60, settings=settings)
+    assert torch.equal(again.vertices, found.vertices)
+    with pytest.raises(NameError, match="_moves"):  # which others need
+        principal_quads(made.vertices, made.topology, count=60)
 
 
 def test_singular_points_go_with_their_vertices() -> None:

@@ -83,7 +83,9 @@ def principal_quads(
 
     laid = replace(surface, sizing=sizing) if chosen.adaptive else surface
     pieces, size = mesh_to_count(laid, lattices, size, chosen, count, lambda made: len(made.faces))
-    pieces = on_surface(pieces if chosen.adaptive else aligned(pieces, surface, size, chosen), surface, chosen)
+    if not (chosen.adaptive and chosen.spacing_range > 1):
+        pieces = aligned(pieces, surface, size, chosen)
+    pieces = on_surface(pieces, surface, chosen)
     faces, positions = pieces.faces, torch.from_numpy(pieces.positions)
     made = verified_topology(faces, len(positions), surface.shape)
     report = measure(positions, made, surface, size, pieces.indices, pieces.creases)
