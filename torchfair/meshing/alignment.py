@@ -24,6 +24,7 @@ _STRAIN = 0.05  # weight of changes of length, relative, beside angles in radian
 _PULL = 2.5  # weight of moves, over spacings, times the squared smoothing of directions
 _FARTHEST = 0.25  # move of a round, in spacings
 _TRIES = 8  # with moves that are halved where faces would have no room; then none are left there
+_FOLLOWED = 1e-3  # radians, by the sum below: edges that follow directions
 _LEAST = 1e-9  # length of edges, in spacings
 
 
@@ -42,7 +43,7 @@ def aligned(pieces: Pieces, surface: ReadSurface, spacing: float, settings: Mesh
     are those of the round before: one edge that has to turn does not turn ten others.
 
     A vertex at a singular point takes it along. Where angles do not fall in the mean and in their
-    95 %, by the sum of the one and a quarter of the other, all stay.
+    95 %, by the sum of the one and a quarter of the other, all stay; also where that sum is below 0.001 at first.
 
     Vertices on the boundary and on creases stay. So do those whose faces would have too little room, see
     :class:`FaceRoom`; faces keep their corners.
@@ -57,7 +58,8 @@ def aligned(pieces: Pieces, surface: ReadSurface, spacing: float, settings: Mesh
     topology = Topology.from_faces(pieces.faces, len(start))
     held = topology.is_boundary_vertex.numpy().copy()
     held[pieces.creases.edges.numpy()] = True
-    if held.all():
+    off = _off(start, topology, surface, spacing)
+    if held.all() or off < _FOLLOWED:
         return pieces
     room = FaceRoom.of(topology, start, spacing)
     middles, feet = ClosestPointTracker(surface.reference), ClosestPointTracker(surface.reference)
@@ -68,7 +70,7 @@ def aligned(pieces: Pieces, surface: ReadSurface, spacing: float, settings: Mesh
         moved = points + _with_room(room, points, moves, held)
         on = feet.closest(torch.from_numpy(moved)).positions.numpy()
         points = np.where(held[:, None], start, on)
-    if not _off(points, topology, surface, spacing) < _off(start, topology, surface, spacing):
+    if not _off(points, topology, surface, spacing) < off:
         return pieces
     places = pieces.places.clone()
     number, vertex = np.nonzero((pieces.places.numpy()[:, None] == start).all(-1))
