@@ -12,6 +12,7 @@ surfaces   irregular triangles of analytic surfaces, and files beside the projec
 angle      degrees between inner edges and principal directions, mean and 95 %; none where edges are so short that
            the surface is nearly flat over each of them
 E/C        may be below 1: edges along the boundary carry no energy, and shrunken meshes have less
++ rim      E/C with what the surface still turns between faces and their edges along the boundary: 1 is least
 distance   of the middles of edges and faces from the surface, largest, in mean edges
 topology   whether Euler number and boundary loops are those of the surface
 peers      run if they are installed (``pip install 'torchfair[peers]'``), otherwise left out with a line; targets:
@@ -36,7 +37,7 @@ from meshing_peers import PEERS, PeerMesh, installed, run_peer
 from torch import Tensor
 
 from torchfair import Topology, TorchfairError
-from torchfair.geometry import edge_lengths
+from torchfair.geometry import edge_lengths, face_normals
 from torchfair.io import load_mesh
 from torchfair.meshing import MeshCreases, MeshingSettings, principal_quads, principal_triangles
 from torchfair.meshing.components import ReadSurface, read_surface
@@ -169,15 +170,33 @@ def judged(mesh: PeerMesh | str, surface: Mesh, read: ReadSurface) -> dict[str, 
     no_creases = MeshCreases(torch.zeros((0, 2), dtype=torch.int64), vertices.new_zeros(0, 2, 3))
     report = measure(vertices, topology, read, spacing, vertices.new_zeros(0), no_creases)
     same = shape_of(topology) == shape_of(surface[1])
+    rim = bending_at_the_rim(vertices, topology, read) / read.total_absolute_curvature
     return {
         "faces": topology.num_faces,
         "angle": report["angle_mean_degrees"],
         "angle_95": report["angle_95_degrees"],
         "ratio": report["variation_over_curvature"],
+        "with_rim": report["variation_over_curvature"] + rim,
         "distance": report["distance_max"],
         "topology": same,
         "seconds": mesh.seconds,
     }
+
+
+def bending_at_the_rim(vertices: Tensor, topology: Topology, read: ReadSurface) -> float:
+    """What E leaves out: ``l a`` over boundary edges, a between their faces and the surface at their middles."""
+    ends, triangles = topology.boundary_edges, read.smooth_frames.topology.triangles
+    if not len(ends):
+        return 0.0
+    outer = topology.corner_edges >= topology.num_interior_edges
+    order = topology.corner_edges[outer].argsort()  # as boundary edges are
+    normals = face_normals(vertices, topology)[topology.corner_faces[outer][order]]
+    on = read.reference.closest(vertices[ends].mean(1))
+    corners = torch.cat([of.normals for of in read.fits])[triangles[on.faces]]
+    smooth = (on.weights[..., None] * corners).sum(1)
+    turned = torch.linalg.cross(smooth, normals).norm(dim=1)
+    angles = torch.atan2(turned, (smooth * normals).sum(1).abs())  # peers may turn surfaces over
+    return float((angles * vertices[ends].diff(dim=1).squeeze(1).norm(dim=1)).sum())
 
 
 def compare(names: list[str], count: int) -> dict[str, dict[str, dict[str, Any]]]:
@@ -185,10 +204,8 @@ def compare(names: list[str], count: int) -> dict[str, dict[str, dict[str, Any]]
     peers = installed()
     for name in PEERS.keys() - set(peers):
         print(f"{name} is not installed: left out (pip install 'torchfair[peers]')")
-    print(
-        f"\n{'surface':<18}{'':<16}{'faces':>6}{'angle':>8}{'95 %':>7}{'E/C':>7}{'distance':>10}{'seconds':>9}", end=""
-    )
-    print("  topology")
+    print(f"\n{'surface':<34}{'faces':>6}{'angle':>8}{'95 %':>7}{'E/C':>7}{'+ rim':>7}", end="")
+    print(f"{'distance':>10}{'seconds':>9}  topology")
     table: dict[str, dict[str, dict[str, Any]]] = {}
     for name in names:
         surface = surface_of(name)
@@ -207,7 +224,8 @@ def compare(names: list[str], count: int) -> dict[str, dict[str, dict[str, Any]]
 def line(row: dict[str, Any]) -> str:
     if "failure" in row:
         return f"  {row['failure']}"
-    words = f"{row['faces']:>6}{row['angle']:8.2f}{row['angle_95']:7.2f}{row['ratio']:7.3f}{row['distance']:10.3f}"
+    words = f"{row['faces']:>6}{row['angle']:8.2f}{row['angle_95']:7.2f}{row['ratio']:7.3f}{row['with_rim']:7.3f}"
+    words += f"{row['distance']:10.3f}"
     return words + f"{row['seconds']:9.2f}  {'same' if row['topology'] else 'OTHER'}"
 
 
@@ -222,6 +240,8 @@ def summarise(peer: str, table: dict[str, dict[str, dict[str, Any]]]) -> None:
     print(
         f"against {peer}, {len(both)} of {len(table)} surfaces: lower angle on {angle}, lower E/C on {ratio}, ", end=""
     )
+    rims = sum(mine["with_rim"] < its["with_rim"] for mine, its in both)
+    print(f"with the rim on {rims}, ", end="")
     print(f"{min(times):.1f} to {max(times):.1f} times its time, at most {SLOWER:.0f} times on {fast}")
 
 
