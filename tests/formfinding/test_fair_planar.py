@@ -14,6 +14,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.formfinding import FairRecipe, FairSettings, minimise_normal_variation
+from torchfair.formfinding.fair import problem as problem_module
 from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.formfinding.job.plan import Stage
 from torchfair.geometry import corner_angles
@@ -26,6 +27,25 @@ def quad(warp: float) -> tuple[Tensor, Topology]:
     heights = 0.5 * warp * torch.tensor([-1.0, 1.0, -1.0, 1.0], dtype=DOUBLE)
     plane = torch.tensor([[0.0, 0], [1, 0], [1, 1], [0, 1]], dtype=DOUBLE)
     return torch.cat([plane, heights[:, None]], 1), Topology.from_faces([[0, 1, 2, 3]])
+
+
+def stages(monkeypatch: pytest.MonkeyPatch) -> tuple[list[float], list[int]]:
+    """Shares of the stages that lower E, and before each one without E how many of these there were."""
+    shares: list[float] = []
+    planar: list[int] = []
+    stage, planar_stage = FairProblem.stage, FairProblem.planar_stage
+
+    def noted(problem: FairProblem, state: State, share: float, *others: Any) -> Stage:
+        shares.append(share)
+        return stage(problem, state, share, *others)
+
+    def noted_planar(problem: FairProblem, state: State, share: float) -> Stage:
+        planar.append(len(shares))
+        return planar_stage(problem, state, share)
+
+    monkeypatch.setattr(FairProblem, "stage", noted)
+    monkeypatch.setattr(FairProblem, "planar_stage", noted_planar)
+    return shares, planar
 
 
 def smallest(vertices: Tensor, topology: Topology) -> float:
@@ -60,24 +80,64 @@ def test_what_cannot_become_planar_is_named_and_left_as_it_was() -> None:
 
 
 def test_weights_that_cannot_make_faces_planar_are_not_raised_further(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Within the limit none can: after the whole weight they are made planar beyond it, and E is lowered there."""
-    shares, planar, settings = [], [], FairSettings(planar="quads", continuation=())
-    stage, planar_stage = FairProblem.stage, FairProblem.planar_stage
+    """Within the limit none can: after the whole weight they are made planar beyond it, and E is lowered there.
 
-    def noted(problem: FairProblem, state: State, share: float, *others: Any) -> Stage:
-        shares.append(share)
-        return stage(problem, state, share, *others)
-
-    def noted_planar(problem: FairProblem, state: State, share: float) -> Stage:
-        planar.append(len(shares))
-        return planar_stage(problem, state, share)
-
-    monkeypatch.setattr(FairProblem, "stage", noted)
-    monkeypatch.setattr(FairProblem, "planar_stage", noted_planar)
+    As it is where fewer faces are so far from planar.
+    """
+    monkeypatch.setattr(problem_module, "_LARGEST_MEAN_WARP", math.inf)
+    shares, planar = stages(monkeypatch)
+    settings = FairSettings(planar="quads", continuation=())
     result = minimise_normal_variation(*quad(0.4), settings=settings)
     assert result.holds
     assert planar[0] == 8
     assert shares[:8] == pytest.approx([(number + 1) / 8 for number in range(8)])
+
+
+def test_faces_that_cannot_become_planar_even_without_e_are_not_tried_with_e(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All five weights of planarity alone, then E is lowered at the weak one."""
+    shares, planar = stages(monkeypatch)
+    vertices, topology = quad(0.4)
+    result = minimise_normal_variation(vertices, topology, settings=FairSettings(planar="quads", boundary="fixed"))
+    assert not result.holds
+    assert torch.equal(result.vertices, vertices)
+    assert planar == [0] * 5
+    assert shares == pytest.approx([1 / 3])
+
+
+@pytest.mark.parametrize("reference", [False, True])
+def test_faces_that_can_become_planar_come_out_as_if_that_had_not_been_asked_first(
+    monkeypatch: pytest.MonkeyPatch, reference: bool
+) -> None:
+    vertices, topology = quad(0.4)
+    settings, surface = FairSettings(planar="quads", continuation=()), (vertices, topology) if reference else None
+    _, planar = stages(monkeypatch)
+    asked = minimise_normal_variation(vertices, topology, reference=surface, settings=settings)
+    assert planar[0] == 0
+    monkeypatch.setattr(problem_module, "_LARGEST_MEAN_WARP", math.inf)
+    plain = minimise_normal_variation(vertices, topology, reference=surface, settings=settings)
+    assert asked.holds
+    assert torch.equal(asked.vertices, plain.vertices)
+    assert asked.notes == plain.notes
+
+
+@pytest.mark.parametrize(
+    ("warp", "settings", "handles", "far"),
+    [
+        (0.11, FairSettings(planar="quads"), None, True),
+        (0.09, FairSettings(planar="quads"), None, False),
+        (0.09, FairSettings(planar="quads", distance_limit=0.04), None, True),
+        (0.045, FairSettings(planar="quads", distance_limit=0.01), None, False),
+        (0.11, FairSettings(planar="quads", distance_limit=None), None, False),
+        (0.11, FairSettings(planar="keep"), None, False),
+        (0.11, FairSettings(planar="quads"), {0: [0.0, 0.0, 1.0]}, False),
+    ],
+)
+def test_faces_are_far_from_planar_whose_corners_would_go_beyond_the_limit(
+    warp: float, settings: FairSettings, handles: dict[int, list[float]] | None, far: bool
+) -> None:
+    """By half of what their diagonals are apart; where it is known how far that is, and no handles pull."""
+    recipe = FairRecipe(*quad(warp), settings=settings, handles=handles)
+    assert recipe.problem.is_far_from_planar(recipe.start) is far
 
 
 def test_vertices_off_the_surface_have_room_while_e_is_lowered() -> None:

@@ -57,23 +57,36 @@ class FairPlan(Plan):
 
         Where neither helps, they are made planar from where the planes of faces meet. The best is kept, of those within
         the distance limit if there are any; the start is where it had planar faces and least E. Where none has planar
-        faces, the start is, with E lowered as far as no face is warped more than the worst one was.
+        faces, the start is, with E lowered as far as no face is warped more than the worst one was. Where that is
+        likely, it is tried at once whether faces become planar at all, which takes less time than to find out with E.
         """
         problem, start = self._problem, self.state["vertices"]
         every = problem.settings.projection.takes_every_step
         problem.most_warped = math.inf
+        if not every and problem.is_far_from_planar(start):
+            goals = problem.has_other_goals
+            yield from self._planar_alone(start, problem.settings.planar_distance)
+            tried = self.state["vertices"]
+            if problem.largest_warp(tried) > PLANAR_PROMISE:
+                yield from self._best_of(start, [tried])
+                return
+            problem.near.put_back()
+            problem.has_other_goals, self.state = goals, problem.blocks(start)
         yield from self._lowered(self.planned(), start, _LARGEST_SHARE if not every else 1.0)
         if every or not problem.panels.makes_planar:
             return
-        energy, warp = problem.energy(start), problem.largest_warp(start)
-        first = self.state["vertices"]
+        energy, first = problem.energy(start), self.state["vertices"]
         near_enough = problem.is_planar_within_limits(first)
         if near_enough and problem.energy(first) <= _LITTLE_MORE * energy:
             if problem.energy(first) > energy and self._may_stay(start):
                 self.state = problem.blocks(start)
             return
         yield from self._made_planar(start, 0.0 if near_enough else problem.settings.planar_distance)
-        found = [first, self.state["vertices"]]
+        yield from self._best_of(start, [first, self.state["vertices"]])
+
+    def _best_of(self, start: Tensor, found: list[Tensor]) -> Stages:
+        """The best of the meshes that were found and, if none has planar faces, what else can be made of the start."""
+        problem, warp = self._problem, self._problem.largest_warp(start)
         planar = [vertices for vertices in found if problem.largest_warp(vertices) <= PLANAR_PROMISE]
         meeting = None if planar else problem.where_planes_meet(start)
         if meeting is not None:
@@ -116,6 +129,18 @@ class FairPlan(Plan):
 
     def _made_planar(self, start: Tensor, most: float) -> Stages:
         """Makes faces planar near the start, as far away as that takes and at most so far, and lowers E from there."""
+        yield from self._planar_alone(start, most)
+        problem, planar = self._problem, self.state["vertices"]
+        if problem.largest_warp(planar) > PLANAR_PROMISE:
+            return
+        problem.near.lift(planar, room=_ROOM)
+        yield from self._lowered([Portion(1.0, 1.0)], planar, _LARGEST_SHARE)
+        lowered = self.state["vertices"]
+        if problem.largest_warp(lowered) > PLANAR_PROMISE or problem.energy(lowered) > problem.energy(planar):
+            self.state = problem.blocks(planar)
+
+    def _planar_alone(self, start: Tensor, most: float) -> Stages:
+        """Makes faces planar near the start, as far away as that takes and at most so far."""
         problem = self._problem
         problem.near.lift(start, most)
         problem.has_other_goals = True
@@ -126,14 +151,6 @@ class FairPlan(Plan):
             self.state = problem.blocks(self.state["vertices"])
             if problem.panels.are_planar(problem.placed(self.state)):
                 break
-        planar = self.state["vertices"]
-        if problem.largest_warp(planar) > PLANAR_PROMISE:
-            return
-        problem.near.lift(planar, room=_ROOM)
-        yield from self._lowered([Portion(1.0, 1.0)], planar, _LARGEST_SHARE)
-        lowered = self.state["vertices"]
-        if problem.largest_warp(lowered) > PLANAR_PROMISE or problem.energy(lowered) > problem.energy(planar):
-            self.state = problem.blocks(planar)
 
     def _not_warped_more(self, warp: float) -> Stages:
         """Lowers E where faces cannot become planar: none becomes worse than the worst one was."""

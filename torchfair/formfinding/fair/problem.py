@@ -32,6 +32,7 @@ from .terms import fair_terms, planar_terms
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8
 _MOST_STAGES = 20
+_LARGEST_MEAN_WARP = 0.05  # relative planarity: meshes that became planar had a fifth of it at most
 
 KEEP_LIMIT = ": planar_distance 0 to keep that"
 """How a note ends that says that planar faces lie beyond the distance limit: what settings can do."""
@@ -201,6 +202,18 @@ class FairProblem:
     def is_planar_within_limits(self, vertices: Tensor) -> bool:
         """Whether the faces of ``vertices`` (V, 3) are planar as promised, within the limits of the start."""
         return self.largest_warp(vertices) <= PLANAR_PROMISE and not self._leaves_limits(vertices)
+
+    def is_far_from_planar(self, vertices: Tensor) -> bool:
+        """Whether faces of a mesh (V, 3) that are to be planar would, in the mean, take corners beyond the limit.
+
+        Along the normal each corner of a quad has to go half of the distance between its diagonals. Not where handles
+        pull, which have to go on step by step.
+        """
+        limit = self.settings.distance_limit
+        if limit is None or not self.panels.makes_planar or self.pulls.pulled.any():
+            return False
+        warped = self.panels.warps(self.placed({"vertices": vertices}))
+        return float(warped.mean()) > max(2.0 * limit, _LARGEST_MEAN_WARP)
 
     def where_planes_meet(self, vertices: Tensor) -> Tensor | None:
         """A start (V, 3) nearer to planar faces, far off within the tangent planes; None if it breaks bounds."""
