@@ -8,9 +8,10 @@ from helpers import DOUBLE, grid_faces
 from torch import Tensor
 
 from torchfair import MeshError, Topology
-from torchfair.constraints import EdgeDirections, FlatEdges
+from torchfair.constraints import EdgeDirections, FlatEdges, edge_direction_terms
 from torchfair.formfinding import FairSettings, minimise_normal_variation
 from torchfair.geometry import planarity
+from torchfair.projection import ElementTerm
 
 
 def quads(n: int = 6, bend: float = 0.0) -> tuple[Tensor, Topology]:
@@ -28,6 +29,27 @@ def test_the_value_is_half_the_square_of_what_edges_turn() -> None:
     turn = torch.tensor([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]], dtype=DOUBLE)
     value = EdgeDirections(vertices, topology)(vertices @ turn)
     torch.testing.assert_close(value, 0.5 * topology.num_interior_edges * sine**2)
+
+
+def test_edges_have_other_directions_than_their_own_where_these_are_given() -> None:
+    """A grid is beside the edges of a turned one by the sine of the angle, and the turned one is not."""
+    vertices, topology = quads()
+    angle = torch.tensor(0.3, dtype=DOUBLE)
+    cosine, sine = angle.cos(), angle.sin()
+    turn = torch.tensor([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]], dtype=DOUBLE)
+    every = torch.arange(topology.num_interior_edges)
+    ends = vertices[topology.interior_edges]
+    along = 7.0 * (ends[:, 1] - ends[:, 0]) @ turn  # of any length
+    (term,) = edge_direction_terms(vertices, topology, every, along=along, weight=1.0)
+    for places, expected in ((vertices, sine.abs()), (vertices @ turn, 0 * sine)):
+        values = torch.stack([term.residual(places[ends], *data) for ends, *data in _elements(term)])
+        torch.testing.assert_close(values.abs(), expected.expand_as(values))
+
+
+def _elements(term: ElementTerm) -> list[tuple[Tensor, ...]]:
+    """Stencil and data of each element."""
+    ((_, stencil),) = term.stencil
+    return list(zip(stencil, *term.data, strict=True))
 
 
 @pytest.mark.parametrize("how", ["stretched", "bent"])

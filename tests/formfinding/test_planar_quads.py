@@ -21,9 +21,9 @@ from torchfair.formfinding import (
     minimise_normal_variation,
     planar_quads,
 )
-from torchfair.meshing import QuadMesh, combing, principal_quads
+from torchfair.meshing import QuadMesh, combing, measure_mesh_on, principal_quads
 from torchfair.projection import Callback, Status
-from torchfair.shapes import PrincipalParaboloid, builtin_mesh, irregular_triangles
+from torchfair.shapes import PrincipalParaboloid, builtin_mesh, icosphere, irregular_triangles
 
 MODULE = sys.modules[planar_quads.__module__]
 
@@ -68,6 +68,21 @@ def test_one_solve_where_edges_keep_their_directions(saddle, asked):
     assert made.report["planarity_max"] < 1e-4
     assert turned(made) < 1
     assert not any("turn edges" in note for note in made.notes)
+
+
+def test_edges_are_drawn_to_the_principal_directions_where_they_are():
+    """Kept parallel to what they were, edges leave the directions as they move along: where quads are nearly square."""
+    ball = icosphere(3)
+    surface = ball.vertices * ball.vertices.new_tensor([1.0, 0.75, 0.5]), ball.topology
+    mesh = principal_quads(*surface, count=150)
+    made, job = planar_quads(mesh, surface)
+    kept = minimise_normal_variation(mesh.vertices, mesh.topology, reference=surface, settings=PLANAR_QUADS)
+    parallel = measure_mesh_on(kept.vertices, mesh)
+    assert job.holds
+    assert kept.holds
+    before, after = mesh.report["angle_mean_degrees"], made.report["angle_mean_degrees"]
+    assert after - before < 0.5 * (parallel["angle_mean_degrees"] - before)
+    assert made.report["normal_variation"] < 1.005 * parallel["normal_variation"]
 
 
 def test_where_edges_turn_too_far_directions_count_more_and_what_is_left_is_said(saddle, asked, monkeypatch):

@@ -18,7 +18,13 @@ def sideways(x: Tensor, across: Tensor) -> Tensor:
 
 
 def edge_direction_terms(
-    vertices: Tensor, topology: Topology, edges: Tensor, *, weight: float, block: str = "vertices"
+    vertices: Tensor,
+    topology: Topology,
+    edges: Tensor,
+    *,
+    weight: float,
+    along: Tensor | None = None,
+    block: str = "vertices",
 ) -> list[ElementTerm]:
     """How far ``edges`` turn within the surface: sideways components, in the unit of the vertices.
 
@@ -31,6 +37,7 @@ def edge_direction_terms(
         topology: Any polygon mesh.
         edges: (n,) numbers of interior edges, in 0..I-1.
         weight: Of half the squares; dimensionless.
+        along: (n, 3) directions that the edges should have in place of those; of any length.
         block: Name of the vertex block.
 
     Raises:
@@ -40,7 +47,8 @@ def edge_direction_terms(
     if not edges.numel():
         return []
     ends = topology.interior_edges[edges]
-    along = vertices[ends[:, 1]] - vertices[ends[:, 0]]
+    if along is None:
+        along = vertices[ends[:, 1]] - vertices[ends[:, 0]]
     normals = vertex_normals(vertices, topology)[ends].sum(1)
     across = unit(cross(normals, along))
     return [ElementTerm("edge directions", sideways, [(block, ends)], data=(across,), weight=weight, linear=True)]

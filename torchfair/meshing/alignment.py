@@ -10,13 +10,13 @@ import torch
 
 from ..fields import hermitian_solver
 from ..fields.frames import Bools, Floats, Ints
-from ..fields.matchings import QUARTER
 from ..geometry import ClosestPointTracker
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
 from .components import Pieces, ReadSurface
 from .face_room import FaceRoom
 from .measures import angles_to_directions, has_direction
+from .nearest_directions import nearest
 
 _ROUNDS = 3
 _LARGE = 0.03  # radians: residuals above count in proportion, not squared, so that they are not spread
@@ -109,9 +109,7 @@ def _moves(
     lengths = np.maximum(np.linalg.norm(along, axis=1), _LEAST * spacing)[:, None]
     at = middles.closest(torch.from_numpy(points[edges[:inner]].mean(1)))
     faces = at.faces.numpy()
-    principal = np.angle((at.weights.numpy() * directions.at_corners[faces]).sum(1)) / 2
-    ahead = np.angle(frames.seen(along[:inner], faces))
-    wanted = (principal + np.rint((ahead - principal) / QUARTER) * QUARTER)[:, None]
+    wanted = nearest(frames, directions, faces, at.weights.numpy(), along[:inner])[0][:, None]
     across = np.cos(wanted) * frames.second[faces] - np.sin(wanted) * frames.first[faces]
     across = across * has_direction(directions, spacing)[faces, None] / lengths[:inner]
     off = (along[:inner] * across).sum(1, keepdims=True)

@@ -71,10 +71,18 @@ def planar_quads(
         (True, True)
     """
     from ...meshing import measure_mesh_on  # here, because other jobs need nothing of meshing
+    from ...meshing.nearest_directions import NearestDirections
+
+    directions = NearestDirections(mesh.surface, mesh.report["spacing"])
 
     def solved(settings: FairSettings) -> _Solved:
         job = minimise_normal_variation(
-            mesh.vertices, mesh.topology, reference=surface, settings=settings, callback=callback
+            mesh.vertices,
+            mesh.topology,
+            reference=surface,
+            directions_at=directions,
+            settings=settings,
+            callback=callback,
         )
         return job, {**measure_mesh_on(job.vertices, mesh), "before_planar": mesh.report}
 

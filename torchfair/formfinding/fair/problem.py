@@ -18,6 +18,7 @@ from ...topology import Topology
 from ..job.plan import Stage
 from ..job.pulls import Pulls
 from ..references import GivenReference
+from .edge_guide import EdgeGuide, WantedDirections
 from .face_bounds import FaceBounds
 from .face_planes import on_face_planes
 from .feature_curves import FeatureCurves, feature_curves
@@ -51,9 +52,11 @@ class FairProblem:
         input_edge: Mean edge length of the input, in which the distance limit is given; that of the start is 1.
         near_input: Whether the reference is the input; by default where none is given.
         surface: The reference, where closest points on it have been made ready already.
+        wanted: Directions that edges should have, see :class:`EdgeGuide`.
 
     Attributes:
         near: Closeness to the reference surface.
+        guide: Directions of edges, where they keep some.
         bounds: On corner angles and areas of faces.
         scales: Of smoothing and fairness where the mesh is fine.
         input_edge: Mean edge length of the input.
@@ -80,6 +83,7 @@ class FairProblem:
         input_edge: float = 1.0,
         near_input: bool | None = None,
         surface: Reference | None = None,
+        wanted: WantedDirections | None = None,
     ) -> None:
         self.vertices, self.topology, self.pulls, self.settings = vertices, topology, pulls, settings
         self.notes: list[str] = []
@@ -89,6 +93,7 @@ class FairProblem:
         self.corners = self.curves.rim.corners
         self._tell_of_creases()
         self.scales = Scales() if settings.projection.takes_every_step else scales(vertices, topology)
+        self.guide = EdgeGuide(vertices, topology, wanted)
         self.bounds = FaceBounds(vertices, topology, pulls)
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
@@ -184,11 +189,12 @@ class FairProblem:
         version: tuple[float, ...],
         settings: ProjectionSettings,
     ) -> Stage:
+        self.guide.read(blocks["vertices"])
         return Stage(
             name=name,
             blocks=blocks,
             terms=terms,
-            version=(self.pulls.version, *version),
+            version=(self.pulls.version, self.guide.version, *version),
             settings=settings,
             fixed={"vertices": self.stays() | self.pulls.held},
             guard=self.admits,

@@ -18,6 +18,7 @@ from ...topology import Topology
 from ..job import JobResult, Level, Promise, Recipe, Stage, solved
 from ..references import GivenReference, normalised_reference, refuse_far_reference, surface_of
 from ..stopping import interrupted_at_the_start
+from .edge_guide import WantedDirections, normalised_directions
 from .feature_curves import FeatureCurves, feature_curves
 from .measures import fair_measures, fair_promises, located
 from .plan import FairPlan
@@ -35,9 +36,11 @@ class FairRecipe(Recipe[FairSettings]):
         input_edge: Mean edge length in which the distance limit is given; by default that of the start.
         near_input: Whether the reference is the input; by default where none is given.
         fixed: Vertices that stay where they are.
+        directions_at: See :func:`minimise_normal_variation`.
 
     Attributes:
         reference: The surface to stay close to: vertices and topology, or a function.
+        directions_at: As given.
     """
 
     name = "fair"
@@ -54,6 +57,7 @@ class FairRecipe(Recipe[FairSettings]):
         input_edge: float | None = None,
         near_input: bool | None = None,
         fixed: Iterable[int] = (),
+        directions_at: WantedDirections | None = None,
     ) -> None:
         super().__init__(vertices, topology, settings or FairSettings())
         surface = None if reference is None else normalised_reference(reference, self.unit)
@@ -64,7 +68,7 @@ class FairRecipe(Recipe[FairSettings]):
             refuse_far_reference(surface, made, self.start, self.topology, most=self.settings.reference_distance)
         self.reference = reference or (self.given, self.topology)
         self.rim = rim or feature_curves(self.given, self.topology, self.settings)
-        self.input_edge = input_edge or self.unit.length
+        self.input_edge, self.directions_at = input_edge or self.unit.length, directions_at
         self.problem = FairProblem(
             self.start,
             self.topology,
@@ -75,6 +79,7 @@ class FairRecipe(Recipe[FairSettings]):
             input_edge=self.input_edge / self.unit.length,
             near_input=near_input,
             surface=made,
+            wanted=None if directions_at is None else normalised_directions(directions_at, self.unit),
         )
         self.notes = self.problem.notes
         self.fix(fixed, handles or {})
@@ -183,6 +188,7 @@ def minimise_normal_variation(
     handles: Mapping[int, Sequence[float]] | None = None,
     fixed: Iterable[int] = (),
     levels: int = 0,
+    directions_at: WantedDirections | None = None,
     settings: FairSettings | None = None,
     callback: Callback | None = None,
 ) -> JobResult[Level]:
@@ -207,6 +213,9 @@ def minimise_normal_variation(
         fixed: Numbers of vertices that stay where they are.
         levels: How often to refine the result and lower E again: triangles by Loop's scheme, others by Catmull and
             Clark's. Reference and boundary curves stay; handles, and what is planar or flat, are carried on.
+        directions_at: With ``settings.directions`` of ``"keep"``, the directions that interior edges should have where
+            they are, in place of their own: a function of their middles (n, 3) and vectors (n, 3) that gives (n, 3)
+            vectors, zero for edges that keep their own. Asked before every stage.
         settings: Weights, bounds and tolerances.
         callback: Called with every iteration record, whose quantities hold ``normal_variation``; returning
             True stops. Ctrl-C, or a function that raises KeyboardInterrupt, returns the best mesh so far.
@@ -234,6 +243,14 @@ def minimise_normal_variation(
     chosen = list(fixed)
 
     def begin() -> FairRecipe:
-        return FairRecipe(vertices, topology, reference=reference, handles=handles, fixed=chosen, settings=settings)
+        return FairRecipe(
+            vertices,
+            topology,
+            reference=reference,
+            handles=handles,
+            fixed=chosen,
+            settings=settings,
+            directions_at=directions_at,
+        )
 
     return solved(begin, vertices, levels=levels, callback=callback)

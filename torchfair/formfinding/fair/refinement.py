@@ -43,6 +43,7 @@ def refined(recipe: FairRecipe, vertices: Tensor) -> FairRecipe:
         rim=rim,
         input_edge=recipe.input_edge,
         near_input=recipe.problem.near_input,
+        directions_at=recipe.directions_at,
     )
     finer.pull(recipe.handles)
     finer.pulls.hold(torch.nonzero(pulls.held).squeeze(1))

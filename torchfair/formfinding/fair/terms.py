@@ -76,9 +76,7 @@ def _energy(problem: FairProblem, blur: float) -> list[ElementTerm]:
 def _directions(problem: FairProblem, share: float = 1.0) -> list[ElementTerm]:
     if problem.settings.directions == "free":
         return []
-    every = torch.arange(problem.topology.num_interior_edges)
-    weight = share * problem.settings.direction_weight
-    return c.edge_direction_terms(problem.vertices, problem.topology, every, weight=weight)
+    return problem.guide.terms(weight=share * problem.settings.direction_weight)
 
 
 def _fairness(problem: FairProblem, blur: float) -> list[ElementTerm]:

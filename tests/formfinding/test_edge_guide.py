@@ -1,0 +1,89 @@
+"""Edges are drawn to directions that change as they move."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from helpers import DOUBLE, grid_faces
+from torch import Tensor
+
+from torchfair import Topology
+from torchfair.formfinding import FairSettings, minimise_normal_variation
+from torchfair.formfinding.fair.edge_guide import EdgeGuide
+
+
+def grid(n: int = 5) -> tuple[Tensor, Topology]:
+    x, y = torch.meshgrid(*(torch.arange(n, dtype=DOUBLE),) * 2, indexing="ij")
+    return torch.stack([x, y, 0 * x], -1).reshape(-1, 3), Topology.from_faces(grid_faces(n, n))
+
+
+def off(guide: EdgeGuide, vertices: Tensor) -> Tensor:
+    """(I,) how far edges are sideways of their directions."""
+    (term,) = guide.terms(weight=1.0)
+    ((_, ends),) = term.stencil
+    return torch.stack([term.residual(vertices[of], *data) for of, *data in zip(ends, *term.data, strict=True)])[:, 0]
+
+
+def around(middles: Tensor, along: Tensor) -> Tensor:
+    """Circles about the z axis, and rays: whichever is nearer."""
+    ray = torch.nn.functional.normalize(middles * middles.new_tensor([1.0, 1.0, 0.0]), dim=1)
+    circle = torch.stack([-ray[:, 1], ray[:, 0], ray[:, 2]], 1)
+    return torch.where(((along * ray).sum(1).abs() > (along * circle).sum(1).abs())[:, None], ray, circle)
+
+
+def test_edges_keep_their_own_directions_where_none_are_wanted():
+    vertices, topology = grid()
+    moved = vertices + 0.1 * torch.sin(3 * vertices.flip(1).roll(-1, 1))
+    own, none = EdgeGuide(vertices, topology), EdgeGuide(vertices, topology, lambda middles, along: 0 * along)
+    none.read(moved)
+    assert float(off(own, vertices).abs().max()) == 0
+    assert float(off(own, moved).abs().max()) > 0.05
+    torch.testing.assert_close(off(none, moved).abs(), off(own, moved).abs())
+
+
+def test_directions_are_those_where_the_edges_are_when_they_are_read():
+    """Of a polar grid that was moved: off at first, on them where it was read off."""
+    plane, topology = grid()
+    radius, angle = 2 + plane[:, 0], 0.1 * plane[:, 1]
+    polar = torch.stack([radius * angle.cos(), radius * angle.sin(), 0 * radius], 1)
+    moved = polar + polar.new_tensor([0.0, 1.0, 0.0])
+    guide = EdgeGuide(polar, topology, around)
+    guide.read(polar)
+    assert float(off(guide, polar).abs().max()) < 1e-12
+    first = guide.version
+    guide.read(moved)
+    assert guide.version > first
+    assert float(off(guide, moved).abs().max()) > 0.05
+    guide.read(polar)
+    assert float(off(guide, polar).abs().max()) < 1e-12
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+def test_directions_are_asked_for_in_the_unit_of_the_input_and_before_every_stage(scale):
+    """What edges become does not depend on the unit, and those of a grid turn to a field that is not theirs."""
+    plane, topology = grid()
+    places = scale * (plane + plane.new_tensor([3.0, -2.0, 0.0]))
+    asked = []
+
+    def wanted(middles: Tensor, along: Tensor) -> Tensor:
+        asked.append(middles)
+        return around(middles, along)
+
+    settings = FairSettings(directions="keep", boundary="free", free_boundary_weight=0.1, direction_weight=1e3)
+    result = minimise_normal_variation(
+        places, topology, reference=(places, topology), settings=settings, directions_at=wanted
+    )
+    runs = len(result.levels[-1].runs)
+    assert len(asked) == runs > 1
+    ends = places[topology.interior_edges].mean(1)
+    torch.testing.assert_close(asked[0], ends)
+    assert not torch.equal(asked[-1], asked[0])
+
+    def mean_angle(vertices: Tensor) -> float:
+        ends = vertices[topology.interior_edges]
+        along = ends[:, 1] - ends[:, 0]
+        field = around(ends.mean(1), along)
+        sine = torch.linalg.vector_norm(torch.linalg.cross(along, field), dim=1)
+        return float(torch.atan2(sine, (along * field).sum(1).abs()).mean())
+
+    assert mean_angle(result.vertices) < 0.5 * mean_angle(places)

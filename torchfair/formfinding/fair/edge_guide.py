@@ -1,0 +1,58 @@
+"""Directions that edges keep while E is lowered: those of the start, or those wanted where the edges are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from ...constraints import edge_direction_terms
+from ...normalisation import Normalisation
+from ...projection import ElementTerm
+from ...topology import Topology
+
+WantedDirections = Callable[[Tensor, Tensor], Tensor]
+"""Of edges with middles (n, 3) and vectors (n, 3): the directions (n, 3) they should have, zero to keep their own."""
+
+
+class EdgeGuide:
+    """The directions of all interior edges of one mesh.
+
+    Args:
+        vertices: (V, 3) start.
+        topology: Its connectivity.
+        wanted: Directions that edges should have, which change as the edges move: they are read off anew before every
+            stage. By default those of the start.
+
+    Attributes:
+        version: How often they were read off.
+    """
+
+    def __init__(self, vertices: Tensor, topology: Topology, wanted: WantedDirections | None = None) -> None:
+        self._topology, self._wanted = topology, wanted
+        self._every = torch.arange(topology.num_interior_edges)
+        self._start = self._along(vertices)
+        self._at, self._directions, self.version = vertices, self._start, 0
+
+    def _along(self, vertices: Tensor) -> Tensor:
+        ends = vertices[self._topology.interior_edges]
+        return ends[:, 1] - ends[:, 0]
+
+    def read(self, vertices: Tensor) -> None:
+        """Reads off what is wanted where a mesh (V, 3) is."""
+        if self._wanted is None:
+            return
+        found = self._wanted(vertices[self._topology.interior_edges].mean(1), self._along(vertices))
+        has = (found != 0.0).any(1, keepdim=True)
+        self._at, self._directions = vertices, torch.where(has, found, self._start)
+        self.version += 1
+
+    def terms(self, *, weight: float) -> list[ElementTerm]:
+        """How far edges are sideways of their directions, see :func:`.edge_direction_terms`."""
+        return edge_direction_terms(self._at, self._topology, self._every, along=self._directions, weight=weight)
+
+
+def normalised_directions(wanted: WantedDirections, unit: Normalisation) -> WantedDirections:
+    """Directions given in the unit of the input, of edges in that of the job."""
+    return lambda middles, along: wanted(unit.invert(middles), along)
