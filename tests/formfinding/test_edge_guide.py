@@ -8,7 +8,7 @@ from helpers import DOUBLE, grid_faces
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.formfinding import FairSettings, minimise_normal_variation
+from torchfair.formfinding import FairRecipe, FairSettings, minimise_normal_variation
 from torchfair.formfinding.fair.edge_guide import EdgeGuide
 
 
@@ -56,6 +56,14 @@ def test_directions_are_those_where_the_edges_are_when_they_are_read():
     assert float(off(guide, moved).abs().max()) > 0.05
     guide.read(polar)
     assert float(off(guide, polar).abs().max()) < 1e-12
+
+
+@pytest.mark.parametrize("wanted", [around, None])
+def test_terms_are_made_anew_for_directions_that_were_read_anew(wanted):
+    """And only then."""
+    recipe = FairRecipe(*grid(), settings=FairSettings(directions="keep"), directions_at=wanted)
+    stages = [recipe.problem.stage(recipe.state(), 1.0, 1.0, recipe.settings.projection) for _ in range(2)]
+    assert (stages[0].version != stages[1].version) is (wanted is not None)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-3])

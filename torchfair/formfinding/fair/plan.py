@@ -64,14 +64,13 @@ class FairPlan(Plan):
         every = problem.settings.projection.takes_every_step
         problem.most_warped = math.inf
         if not every and problem.is_far_from_planar(start):
-            goals = problem.has_other_goals
             yield from self._planar_alone(start, problem.settings.planar_distance)
             tried = self.state["vertices"]
             if problem.largest_warp(tried) > PLANAR_PROMISE:
                 yield from self._best_of(start, [tried])
                 return
             problem.near.put_back()
-            problem.has_other_goals, self.state = goals, problem.blocks(start)
+            self.state = problem.blocks(start)
         yield from self._lowered(self.planned(), start, _LARGEST_SHARE if not every else 1.0)
         if every or not problem.panels.makes_planar:
             return

