@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -14,6 +16,8 @@ from torchfair.meshing.integers import split_integers
 from torchfair.meshing.seamless_map import MapProblem
 from torchfair.meshing.seams import find_seams
 from torchfair.shapes import Surface, irregular_triangles
+
+Mesh = tuple[Tensor, Topology]
 
 
 def irregular(surface: Surface, count: int = 700, seed: int = 0) -> tuple[Tensor, Topology]:
@@ -92,3 +96,17 @@ def problem_of(frames: FaceFrames, graph: CutGraph, spacing: float, align: bool 
     split = split_integers(frames, graph, seams, runs)
     density, stiff = np.full((count, 2), 1 / spacing), np.full(count, 30.0)
     return MapProblem(frames, graph, seams, split, np.eye(2), density, stiff), runs
+
+
+def shuffled(vertices: Tensor, topology: Topology, seed: int) -> Mesh:
+    """The same with other numbers of vertices and faces, and faces that start at other corners."""
+    chance = random.Random(seed)
+    order = chance.sample(range(len(vertices)), len(vertices))
+    number = {old: new for new, old in enumerate(order)}
+    faces = []
+    for _, corners in topology.faces_by_size.values():
+        for face in corners.tolist():
+            first = chance.randrange(len(face))
+            faces.append([number[vertex] for vertex in face[first:] + face[:first]])
+    chance.shuffle(faces)
+    return vertices[torch.tensor(order)], Topology.from_faces(faces, len(vertices))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
 from collections.abc import Callable
 
 import pytest
@@ -12,8 +11,7 @@ from creased_shapes import box
 from helpers import random_rotation
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshing_tools import ellipsoid, irregular, punched, side_by_side
-from torch import Tensor
+from meshing_tools import Mesh, ellipsoid, irregular, punched, shuffled, side_by_side
 
 from torchfair import Topology
 from torchfair.meshing import principal_quads, principal_triangles
@@ -23,22 +21,7 @@ from torchfair.shapes import FreeFormPatch, PrincipalParaboloid, Torus, builtin_
 from torchfair.shapes import principal_quads as analytic_quads
 from torchfair.triangulation import triangulate
 
-Mesh = tuple[Tensor, Topology]
 SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
-
-
-def shuffled(vertices: Tensor, topology: Topology, seed: int) -> Mesh:
-    """The same with other numbers of vertices and faces, and faces that start at other corners."""
-    chance = random.Random(seed)
-    order = chance.sample(range(len(vertices)), len(vertices))
-    number = {old: new for new, old in enumerate(order)}
-    faces = []
-    for _, corners in topology.faces_by_size.values():
-        for face in corners.tolist():
-            first = chance.randrange(len(face))
-            faces.append([number[vertex] for vertex in face[first:] + face[:first]])
-    chance.shuffle(faces)
-    return vertices[torch.tensor(order)], Topology.from_faces(faces, len(vertices))
 
 
 def sphere() -> Mesh:

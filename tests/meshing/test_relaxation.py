@@ -115,7 +115,7 @@ def test_with_another_spacing_only_plans_of_the_same_size_are_tried(monkeypatch:
     given = surface.parts[0], surface.fields[0], SQUARES, 0.5, 0.25, MeshingSettings()
     with pytest.raises(NoMeshError, match="5 setting"):
         mesh_component(*given, Again(3, 0.5))
-    assert {plan.spacing for plan in tried} == {0.5}
+    assert {plan.spacing for plan in tried} == {surface.parts[0].pose.length(0.5)}
     tried.clear()
     with pytest.raises(NoMeshError):
         mesh_component(*given)

@@ -22,6 +22,7 @@ from .cut_graph import CutGraph
 from .integers import split_integers
 from .lattice import Lattice
 from .off_lines import off_the_lines
+from .pose import Pose
 from .relaxation import loosened, stretched
 from .seamless_map import MapProblem, SeamlessMap, badness
 from .seams import Seams, find_seams
@@ -93,6 +94,12 @@ class PieceMesh:
     sharp: Floats
     singular_places: Floats
     singular_charges: Ints
+
+    def moved(self, pose: Pose) -> PieceMesh:
+        """The same where the surface was before it was placed."""
+        positions, places = pose.back(self.positions), pose.back(self.singular_places)
+        sharp = pose.back(self.sharp.reshape(-1, 3)).reshape(self.sharp.shape)
+        return replace(self, positions=positions, singular_places=places, sharp=sharp)
 
 
 def attempt(

@@ -20,6 +20,7 @@ from .creases import Creases, find_creases
 from .cut_graph import CutGraph
 from .lattice import Lattice
 from .plans import Kind, Rung, plans
+from .pose import Pose
 from .surface import DesignSurface
 
 _PATHS = 1.3  # times the merging length of quads: paths along edges are longer than straight ones
@@ -77,8 +78,9 @@ def mesh_component(
         NoMeshError: if none does.
     """
     resolution = spacing if again is None else again.resolution
-    prepared = _Prepared(surface, directions, lattice, settings, resolution)
-    rungs = list(plans(spacing, smoothing, settings, bool(surface.sharp.any()), lattice.has_rows))
+    pose = surface.pose
+    prepared = _Prepared(surface, directions, lattice, settings, pose.length(resolution))
+    rungs = list(plans(pose.length(spacing), smoothing, settings, bool(surface.sharp.any()), lattice.has_rows))
     began = time.process_time()
     failures: list[FailedAttemptError] = []
     hopeless: set[Kind] = set()
@@ -92,19 +94,21 @@ def mesh_component(
         done.add((rung.scale, rung.kind))
         found = _with_retries(prepared, rung, failures)
         if found is not None:
-            return *found, number
+            mesh, plan = found
+            return mesh.moved(pose), _in_words(plan, rung.words, pose), number
         if failures[-1].hopeless:
             hopeless.add(rung.kind)
     placed = [failure for failure in failures if failure.vertex >= 0]
     told = placed[0] if placed else failures[-1]
-    raise NoMeshError(_refusal(told, len(failures)), told.vertex)
+    raise NoMeshError(_refusal(told, len(failures), pose), told.vertex)
 
 
 class _Prepared:
     """What attempts at a component share, each thing made once.
 
     Attributes:
-        surface, directions, lattice, settings: of :func:`mesh_component`.
+        surface: of :func:`mesh_component`, in its pose, as all lengths are.
+        directions, lattice, settings: of it.
         resolution: length of edges for which triangles are made fine enough.
     """
 
@@ -116,7 +120,8 @@ class _Prepared:
         settings: MeshingSettings,
         resolution: float,
     ) -> None:
-        self.surface, self.directions, self.resolution = surface, directions, resolution
+        self.given, self.surface, self.resolution = surface, surface.placed, resolution
+        self.directions = surface.pose.directions(directions)
         self.lattice, self.settings = lattice, settings
         self._finer, self._creases, self._graph = cache(self._cut_finer), cache(self._find_creases), cache(self._combed)
 
@@ -134,7 +139,8 @@ class _Prepared:
         if kept or not self.surface.sharp.any():
             return self.surface.cut_finer(self.directions, self.resolution)
         plain = self.surface.without_creases()
-        return plain.cut_finer(plain.directions(self.settings.noise)[0], self.resolution)
+        directions, _ = self.given.without_creases().directions(self.settings.noise)
+        return plain.cut_finer(self.given.pose.directions(directions), self.resolution)
 
     def _find_creases(self, spacing: float, kept: bool) -> Creases:
         triangles = self._finer(kept)[0]
@@ -151,12 +157,12 @@ class _Prepared:
             raise FailedAttemptError(str(error), hopeless=True) from None
 
 
-def _with_retries(prepared: _Prepared, rung: Rung, failures: list[FailedAttemptError]) -> tuple[PieceMesh, str] | None:
-    """The mesh of a plan and what was changed in words, also without creases as lines where it failed; or failures."""
+def _with_retries(prepared: _Prepared, rung: Rung, failures: list[FailedAttemptError]) -> tuple[PieceMesh, Plan] | None:
+    """The mesh of a plan and that plan, also without creases as lines where it failed; or failures."""
     plan = rung.plan
     for _ in range(1 + _RETRIES * (prepared.settings.fallback and plan.creases and plan.align)):
         try:
-            return prepared.attempt(plan), _in_words(plan, rung.words)
+            return prepared.attempt(plan), plan
         except FailedAttemptError as error:
             failures.append(error)
             if error.place is None or error.hopeless:
@@ -176,15 +182,15 @@ def _numbered(rungs: list[Rung], again: Again | None) -> Iterator[tuple[int, Run
             yield number, rung
 
 
-def _in_words(plan: Plan, words: str) -> str:
-    places = ", ".join(f"({x:.3g}, {y:.3g}, {z:.3g})" for x, y, z in plan.apart)
+def _in_words(plan: Plan, words: str, pose: Pose) -> str:
+    places = ", ".join(f"({x:.3g}, {y:.3g}, {z:.3g})" for x, y, z in pose.back(plan.apart))
     return ", ".join(filter(None, [words, f"creases not aligned near {places}" if places else ""]))
 
 
-def _refusal(failure: FailedAttemptError, number: int) -> str:
+def _refusal(failure: FailedAttemptError, number: int, pose: Pose) -> str:
     where = ""
     if failure.vertex >= 0 and failure.place is not None:
-        x, y, z = failure.place
+        x, y, z = pose.back(failure.place[None])[0]
         where = f" near vertex {failure.vertex} at ({x:.4g}, {y:.4g}, {z:.4g})"
     tried = f"{number} setting(s) tried" if number > 1 else "one setting tried"
     return (

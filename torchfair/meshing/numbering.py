@@ -13,7 +13,10 @@ from ..fields.frames import Floats, Ints
 from ..topology import Topology
 from ..triangulation import triangulate
 
-_TIE = 1e-7  # of the size of the surface, below which lengths count as equal
+TIE = 1e-7
+"""Of the size of the surface, below which lengths count as equal."""
+
+_STEPS = 200_000  # of walks that are compared, all together
 
 
 def numbered_by_geometry(points: Tensor, triangles: Tensor) -> tuple[Tensor, Tensor]:
@@ -21,8 +24,9 @@ def numbered_by_geometry(points: Tensor, triangles: Tensor) -> tuple[Tensor, Ten
 
     It is that of a walk over the triangles, breadth first and counterclockwise, from a side of one of them. Of all
     sides that one is taken whose start is farthest from the centroid; of several such by the other corners, the
-    lengths of sides, and at last by coordinates. Those decide only on surfaces with symmetries; elsewhere the order is
-    the same after rigid motions and changes of scale, too.
+    lengths of sides, then by what walks from them meet, and at last by coordinates. Those decide only between sides
+    that a symmetry of the surface brings to each other. So the order is that after rigid motions and changes of scale,
+    too, up to symmetries.
 
     Args:
         points: (V, 3).
@@ -33,7 +37,8 @@ def numbered_by_geometry(points: Tensor, triangles: Tensor) -> tuple[Tensor, Ten
         the corner at which it was entered on.
     """
     corners = triangles.numpy()
-    sides = np.array(_walked(_first(_keys(points.numpy(), corners)), _across(corners).tolist()))
+    across = _across(corners).tolist()
+    sides = np.array(_walked(_first(_keys(points.numpy(), corners), across), across, len(corners)))
     entered = corners[sides[:, None] // 3, (sides[:, None] + np.arange(3)) % 3]
     found, first = np.unique(entered, return_index=True)
     order = found[np.argsort(first)]
@@ -75,7 +80,7 @@ def _cut_quads(points: Floats, corners: Ints) -> Tensor:
     sides = [[*_signs(points, fan, size, far)] for fan in fans]
     second, open_ = np.zeros(len(corners), bool), np.ones(len(corners), bool)
     for one, other in zip(*sides, strict=True):
-        decides = open_ & (np.abs(other - one) > _TIE)
+        decides = open_ & (np.abs(other - one) > TIE)
         second[decides] = (other > one)[decides]
         open_ &= ~decides
     return torch.from_numpy(np.where(second[:, None, None], fans[1], fans[0]).reshape(-1, 3))
@@ -115,20 +120,43 @@ def _keys(points: Floats, triangles: Ints) -> list[Floats]:
     return [np.roll(of, -k, 1).ravel() / far.max() for of in seen for k in range(3)]
 
 
-def _first(keys: list[Floats]) -> int:
-    sides = np.arange(len(keys[0]))
+def _first(keys: list[Floats], across: list[int]) -> int:
+    """The side that comes first by keys, of which the last nine are coordinates, walks before these."""
+    sides = _largest(np.arange(len(keys[0])), keys[:6])
+    steps = 32
+    while len(sides) > 1 and len(sides) * steps <= _STEPS:
+        sides = _by_walks(sides, keys[:6], across, steps)
+        if steps >= len(across) // 3:
+            break
+        steps *= 4
+    return int(_largest(sides, keys[6:])[0])
+
+
+def _largest(sides: Ints, keys: list[Floats]) -> Ints:
     for key in keys:
         if len(sides) == 1:
             break
         here = key[sides]
-        sides = sides[here >= here.max() - _TIE]
-    return int(sides[0])
+        sides = sides[here >= here.max() - TIE]
+    return sides
 
 
-def _walked(start: int, across: list[int]) -> list[int]:
-    """The sides by which triangles are entered, in order."""
-    visited, queue, walk = {start // 3}, deque([start]), []
-    while queue:
+def _by_walks(sides: Ints, keys: list[Floats], across: list[int], steps: int) -> Ints:
+    """Those of some sides whose walks meet what comes first by the keys."""
+    met = np.array([_walked(side, across, steps) for side in sides.tolist()])
+    seen = np.stack([key[met] for key in keys], 2).reshape(len(sides), -1)
+    while (differ := np.ptp(seen, axis=0) > TIE).any():
+        here = seen[:, np.argmax(differ)]
+        kept = here >= here.max() - TIE
+        seen, sides = seen[kept], sides[kept]
+    return sides
+
+
+def _walked(start: int, across: list[int], steps: int) -> list[int]:
+    """The sides by which so many triangles are entered, in order."""
+    visited, queue = {start // 3}, deque([start])
+    walk: list[int] = []
+    while queue and len(walk) < steps:
         side = queue.popleft()
         walk.append(side)
         for k in range(3):

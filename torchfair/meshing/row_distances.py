@@ -8,6 +8,7 @@ import numpy as np
 
 from ..fields import Directions, FaceFrames
 from ..fields.frames import Floats
+from .pose import rounded
 from .sizes import SizeField
 
 EQUILATERAL = math.sqrt(3) / 2
@@ -28,7 +29,7 @@ def row_distance(frames: FaceFrames, directions: Directions) -> float:
     """Distance of rows over the spacing: E exceeds C by ``|a| / (2 ratio^2)`` where K is negative."""
     larger, smaller = _integrals(frames, directions)
     total = float(larger + smaller)
-    return float(_ratio(np.array(min(larger, smaller) / total))) if total > 0 else EQUILATERAL
+    return float(rounded(_ratio(np.array(min(larger, smaller) / total)))) if total > 0 else EQUILATERAL
 
 
 def row_sizes(

@@ -22,6 +22,7 @@ from ..topology import Topology
 from .bridges import cut_bridges
 from .creases import sharp_edges
 from .numbering import numbered_by_geometry, triangles_by_geometry
+from .pose import Pose, rounded
 from .sizes import SizeField
 
 _COARSE = 1.0  # mean edge over the spacing above which triangles are cut
@@ -45,6 +46,17 @@ class DesignSurface:
     numbers: Tensor
     sharp: Bools
     sizes: SizeField | None = None
+
+    @cached_property
+    def pose(self) -> Pose:
+        """Where it is meshed."""
+        return Pose.of(self.vertices.numpy(), self.topology.triangles.numpy())
+
+    @cached_property
+    def placed(self) -> DesignSurface:
+        """The same in its pose."""
+        sizes = self.sizes and SizeField(rounded(self.sizes.means), rounded(self.sizes.values))
+        return replace(self, vertices=torch.from_numpy(self.pose.placed), sizes=sizes)
 
     @cached_property
     def frames(self) -> FaceFrames:
