@@ -14,6 +14,7 @@ from .tracing import Cells
 _SHORT = 0.3  # edges at the boundary, over the spacing
 _SHORTEST = 0.2  # below that edges go even if others turn by more than they may
 _SMALL = 0.08  # area of faces at the boundary, over that of full cells
+_SMALLEST = 0.06  # the same over the mean of the faces, which is larger where lines diverge
 _ROUNDS = 8
 
 
@@ -62,9 +63,14 @@ def _collapse_short(edits: PolygonEdits, lengths: Floats, most: float) -> int:
 
 def _join_small(edits: PolygonEdits, areas: Floats) -> int:
     """Joins faces at curves below an area with the neighbour across their longest side, or collapses their shortest."""
+
+    def share(number: int) -> float:
+        return edits.area(number) / float(areas[edits.faces[number]].min())
+
+    least = max(_SMALL, _SMALLEST * math.fsum(map(share, edits.faces)) / max(len(edits.faces), 1))
     done = 0
     for number in sorted(edits.curve_faces(), key=edits.area):
-        if number not in edits.faces or edits.area(number) >= _SMALL * areas[edits.faces[number]].min():
+        if number not in edits.faces or share(number) >= least:
             continue
         sides = sorted(edits.sides(number), key=edits.length)
         inner = [edge for edge in sides if edits.across(edge, number) is not None]
