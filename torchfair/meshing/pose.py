@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar, cast
+from typing import Any, overload
 
 import numpy as np
 import torch
@@ -20,12 +20,18 @@ _GRID = 2.0**-30
 _COARSE = 2.0**-20  # of the largest curvature: fits are less exact than coordinates
 _THIN = 2.0**10  # times the grid: with lower triangles coordinates are not rounded
 
-Numbers = TypeVar("Numbers", Floats, Complexes)
+
+@overload
+def rounded(values: Floats, grid: float = _GRID) -> Floats: ...
 
 
-def rounded(values: Numbers, grid: float = _GRID) -> Numbers:
+@overload
+def rounded(values: Complexes, grid: float = _GRID) -> Complexes: ...
+
+
+def rounded(values: Any, grid: float = _GRID) -> Any:
     """Values as whole multiples."""
-    return cast(Numbers, np.rint(values / grid) * grid)
+    return np.rint(values / grid) * grid
 
 
 @dataclass(frozen=True, eq=False)
