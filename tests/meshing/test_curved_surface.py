@@ -92,7 +92,7 @@ def test_vertices_stay_where_the_curved_surface_would_flatten_a_corner() -> None
     flat = torch.tensor([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=torch.float64)
     places, none = flat.new_zeros(0, 3), torch.zeros(0, 2, dtype=torch.int64)
     creases = MeshCreases(none, flat.new_zeros(0, 2, 3))
-    pieces = Pieces(flat.numpy(), [[0, 1, 2, 3]], set(), creases, places, places[:, 0], [], [0], None)
+    pieces = Pieces(flat.numpy(), [[0, 1, 2, 3]], set(), creases, places, places[:, 0], [], [0], [4], None)
     for folded, corner in ((False, flat[2] + 0.1), (True, torch.tensor([0.5, 0.001, 0]))):
         moved = flat.index_copy(0, torch.tensor([2]), corner.to(flat)[None])
         surface = cast(ReadSurface, SimpleNamespace(curved=lambda points, moved=moved: moved))

@@ -42,8 +42,9 @@ def aligned(pieces: Pieces, surface: ReadSurface, spacing: float, settings: Mesh
     smoothed: the rougher the surface, the less they are followed. The weights ``w = 1 / sqrt(1 + (angle / 0.03)^2)``
     are those of the round before: one edge that has to turn does not turn ten others.
 
-    A vertex at a singular point takes it along. Where angles do not fall in the mean and in their
-    95 %, by the sum of the one and a quarter of the other, all stay; also where that sum is below 0.001 at first.
+    A vertex at a singular point takes it along. Where angles of a component do not fall in the mean and in their
+    95 %, by the sum of the one and a quarter of the other, all its vertices stay; also where that sum is below 0.001
+    at first.
 
     Vertices on the boundary and on creases stay. So do those whose faces would have too little room, see
     :class:`FaceRoom`; faces keep their corners.
@@ -54,28 +55,41 @@ def aligned(pieces: Pieces, surface: ReadSurface, spacing: float, settings: Mesh
         spacing: of the pieces.
         settings: they say how far directions are smoothed.
     """
-    start = pieces.positions
-    topology = Topology.from_faces(pieces.faces, len(start))
-    held = topology.is_boundary_vertex.numpy().copy()
-    held[pieces.creases.edges.numpy()] = True
+    start, ends = pieces.positions, np.cumsum(pieces.counts)
+    on_creases = np.zeros(len(start), bool)
+    on_creases[pieces.creases.edges.numpy()] = True
+    first = np.searchsorted(ends, [face[0] for face in pieces.faces], side="right")
+    moved = []
+    for number, (end, count) in enumerate(zip(ends.tolist(), pieces.counts, strict=True)):
+        of = slice(end - count, end)
+        faces = [[corner - of.start for corner in pieces.faces[face]] for face in np.flatnonzero(first == number)]
+        part, smoothing = surface.component(number), settings.smoothing_length(surface.fits[number].rings)
+        moved.append(_aligned(start[of], faces, on_creases[of], part, spacing, smoothing))
+    points = np.concatenate(moved)
+    places = pieces.places.clone()
+    which, vertex = np.nonzero((pieces.places.numpy()[:, None] == start).all(-1))
+    places[torch.from_numpy(which)] = torch.from_numpy(points[vertex])
+    return replace(pieces, positions=points, places=places)
+
+
+def _aligned(
+    start: Floats, faces: list[list[int]], on_creases: Bools, surface: ReadSurface, spacing: float, smoothing: float
+) -> Floats:
+    """(V, 3) the vertices of one component after all rounds, or as they were."""
+    topology = Topology.from_faces(faces, len(start))
+    held = topology.is_boundary_vertex.numpy() | on_creases
     off = _off(start, topology, surface, spacing)
     if held.all() or off < _FOLLOWED:
-        return pieces
+        return start
     room = FaceRoom.of(topology, start, spacing)
     middles, feet = ClosestPointTracker(surface.reference), ClosestPointTracker(surface.reference)
-    smoothing = _smoothing(surface, settings)
     points = start
     for _ in range(_ROUNDS):
         moves = _moves(points, start, topology, surface, spacing, smoothing, held, middles, feet)
         moved = points + _with_room(room, points, moves, held)
         on = feet.closest(torch.from_numpy(moved)).positions.numpy()
         points = np.where(held[:, None], start, on)
-    if not _off(points, topology, surface, spacing) < off:
-        return pieces
-    places = pieces.places.clone()
-    number, vertex = np.nonzero((pieces.places.numpy()[:, None] == start).all(-1))
-    places[torch.from_numpy(number)] = torch.from_numpy(points[vertex])
-    return replace(pieces, positions=points, places=places)
+    return points if _off(points, topology, surface, spacing) < off else start
 
 
 def _off(points: Floats, topology: Topology, surface: ReadSurface, spacing: float) -> float:
@@ -85,19 +99,13 @@ def _off(points: Floats, topology: Topology, surface: ReadSurface, spacing: floa
     return float(angles.mean() + np.percentile(angles, 95) / 4) if len(angles) else 0.0
 
 
-def _smoothing(surface: ReadSurface, settings: MeshingSettings) -> Floats:
-    """(F,) lengths over which directions are smoothed, in spacings."""
-    lengths = [settings.smoothing_length(of.rings) for of in surface.fits]
-    return np.repeat(lengths, [part.topology.num_faces for part in surface.parts])
-
-
 def _moves(
     points: Floats,
     start: Floats,
     topology: Topology,
     surface: ReadSurface,
     spacing: float,
-    smoothing: Floats,
+    smoothing: float,
     held: Bools,
     middles: ClosestPointTracker,
     feet: ClosestPointTracker,
@@ -119,9 +127,9 @@ def _moves(
     free = np.flatnonzero(~held)
     turns = _differences(edges[:inner], across, axes, free)
     strains = _differences(edges, along / lengths**2, axes, free)
-    pull = np.repeat(_PULL * (smoothing[below[free]] / spacing) ** 2, 2)
+    pull = _PULL * (smoothing / spacing) ** 2
     back = (axes[free] @ (start - points)[free, :, None]).ravel()
-    matrix = turns.T @ turns + _STRAIN * (strains.T @ strains) + sp.diags(pull)
+    matrix = turns.T @ turns + _STRAIN * (strains.T @ strains) + pull * sp.identity(2 * len(free))
     right = pull * back - turns.T @ (along[:inner] * across).sum(1)
     parts = hermitian_solver(sp.csr_matrix(matrix))(right).reshape(-1, 1, 2)
     moves = np.zeros_like(points)

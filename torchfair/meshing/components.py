@@ -98,6 +98,13 @@ class ReadSurface:
         inside = smooth_absolute_curvature(torch.from_numpy(smooth.points), smooth.topology, normals)
         return float(inside) + sum(part.crease_variation for part in self.parts)
 
+    def component(self, number: int) -> ReadSurface:
+        """One component by itself."""
+        if len(self.parts) == 1:
+            return self  # with what has been made of it
+        only = slice(number, number + 1)
+        return ReadSurface(self.parts[only], self.fields[only], self.fits[only], [])
+
     def sized(self, sizes: SizeField) -> list[DesignSurface]:
         """The components with spacings that differ."""
         counts = [part.topology.num_faces for part in self.parts]
@@ -150,6 +157,7 @@ class Pieces:
         indices: (n,) of the field.
         notes: what was changed, in words.
         plans: (components) number of the plan that gave each.
+        counts: (components) vertices of each, one after the other.
         sizes: what lengths were asked for, None if they were the same everywhere.
     """
 
@@ -161,6 +169,7 @@ class Pieces:
     indices: Tensor
     notes: list[str]
     plans: list[int]
+    counts: list[int]
     sizes: CurvatureSizes | None
 
 
@@ -210,6 +219,7 @@ def mesh_components(
         torch.from_numpy(np.concatenate([mesh.singular_charges / 4 for mesh in made])),
         notes,
         taken,
+        [len(mesh.positions) for mesh in made],
         sizes,
     )
 
