@@ -95,7 +95,9 @@ def test_three_valent_vertices_on_creases_stay() -> None:
     creases = MeshCreases(torch.tensor([[0, 3], [1, 3]]), torch.zeros(0, 2, 3))
     rows = {(0, 3), (4, 7)}
     none = torch.zeros(0)
-    pieces = Pieces(positions.numpy(), faces, rows, creases, torch.zeros(0, 3).double(), none, [], [0], [len(positions)], None)
+    pieces = Pieces(
+        positions.numpy(), faces, rows, creases, torch.zeros(0, 3).double(), none, [], [0], [len(positions)], None
+    )
     moved = torch.from_numpy(with_three_valent_inside(pieces, surface).positions) != positions
     assert moved.any(1).tolist() == [False] * 7 + [True]
 
@@ -131,7 +133,9 @@ def test_faces_that_look_inward_are_turned_over() -> None:
     creases = MeshCreases(none, torch.zeros(0, 2, 3))
 
     def found(corners: list[list[int]]) -> list[int]:
-        given = Pieces(vertices.numpy(), corners, set(), creases, torch.zeros(0, 3), torch.zeros(0), [], [], [len(vertices)], None)
+        given = Pieces(
+            vertices.numpy(), corners, set(), creases, torch.zeros(0, 3), torch.zeros(0), [], [], [len(vertices)], None
+        )
         return turned_over(given, surface).tolist()
 
     assert found(topology.triangles.tolist()) == []
