@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import torch
 from helpers import DOUBLE, grid_faces
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair.errors import SettingsError, TorchfairError
 from torchfair.formfinding import FairRecipe, FairSettings, minimise_normal_variation
 from torchfair.formfinding.fair.edge_guide import EdgeGuide
 
@@ -95,3 +98,48 @@ def test_directions_are_asked_for_in_the_unit_of_the_input_and_before_every_stag
         return float(torch.atan2(sine, (along * field).sum(1).abs()).mean())
 
     assert mean_angle(result.vertices) < 0.5 * mean_angle(places)
+
+
+WRONG = {
+    "one number each": (lambda along: along[:, 0], r"expected a tensor \(40, 3\), got \(40,\)"),
+    "one for all": (lambda along: along[:1], r"expected a tensor \(40, 3\), got \(1, 3\)"),
+    "nothing": (lambda along: None, r"expected a tensor \(40, 3\), got NoneType"),
+    "an array": (lambda along: along.numpy(), r"expected a tensor \(40, 3\), got ndarray"),
+    "not finite": (lambda along: along.index_fill(0, torch.tensor([3]), float("nan")), "not finite.* edges 3$"),
+}
+
+
+@pytest.mark.parametrize("policy", ["judged", "every"])
+@pytest.mark.parametrize("name", WRONG)
+def test_directions_that_are_none_are_refused_by_name(name: str, policy: str) -> None:
+    wrong, message = WRONG[name]
+    settings = FairSettings(directions="keep")
+    settings = replace(settings, projection=replace(settings.projection, step_policy=policy))
+    with pytest.raises(TorchfairError, match=f"directions_at gives.*{message}"):
+        minimise_normal_variation(*grid(6), settings=settings, directions_at=lambda middles, along: wrong(along))
+
+
+def test_directions_of_another_precision_and_with_a_gradient_are_taken() -> None:
+    settings, one = FairSettings(directions="keep"), torch.ones(1, requires_grad=True)
+    mesh = grid()
+    plain, other = (
+        minimise_normal_variation(*mesh, settings=settings, directions_at=wanted).vertices
+        for wanted in (lambda middles, along: along, lambda middles, along: one * along.float())
+    )
+    assert not other.requires_grad
+    torch.testing.assert_close(other, plain, atol=1e-5, rtol=0)
+
+
+def test_directions_without_settings_that_keep_them_are_refused() -> None:
+    for settings in (None, FairSettings()):
+        with pytest.raises(SettingsError, match="directions='keep'"):
+            minimise_normal_variation(*grid(), settings=settings, directions_at=around)
+
+
+def test_directions_are_not_asked_for_where_edges_are_free() -> None:
+    """As in a session whose settings were changed."""
+    asked = []
+    recipe = FairRecipe(*grid(), settings=FairSettings(directions="keep"), directions_at=lambda *of: asked.append(of))
+    recipe.take_settings(FairSettings())
+    recipe.problem.stage(recipe.state(), 1.0, 1.0, recipe.settings.projection)
+    assert not asked

@@ -7,7 +7,9 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from ..._names import first_few
 from ...constraints import edge_direction_terms
+from ...errors import MeshError, ShapeError
 from ...normalisation import Normalisation
 from ...projection import ElementTerm
 from ...topology import Topology
@@ -40,10 +42,16 @@ class EdgeGuide:
         return ends[:, 1] - ends[:, 0]
 
     def read(self, vertices: Tensor) -> None:
-        """Reads off what is wanted where a mesh (V, 3) is."""
+        """Reads off what is wanted where a mesh (V, 3) is.
+
+        Raises:
+            ShapeError: what is wanted is not a tensor (n, 3).
+            MeshError: it is not finite.
+        """
         if self._wanted is None:
             return
         found = self._wanted(vertices[self._topology.interior_edges].mean(1), self._along(vertices))
+        found = _checked(found, len(self._every)).to(self._start)
         has = (found != 0.0).any(1, keepdim=True)
         self._at, self._directions = vertices, torch.where(has, found, self._start)
         self.version += 1
@@ -51,6 +59,16 @@ class EdgeGuide:
     def terms(self, *, weight: float) -> list[ElementTerm]:
         """How far edges are sideways of their directions, see :func:`.edge_direction_terms`."""
         return edge_direction_terms(self._at, self._topology, self._every, along=self._directions, weight=weight)
+
+
+def _checked(found: object, count: int) -> Tensor:
+    if not isinstance(found, Tensor) or found.shape != (count, 3):
+        actual = tuple(found.shape) if isinstance(found, Tensor) else type(found).__name__
+        raise ShapeError("what directions_at gives", f"a tensor ({count}, 3)", actual)
+    if not found.isfinite().all():
+        wrong = torch.nonzero(~found.isfinite().all(1)).squeeze(1).tolist()
+        raise MeshError(f"what directions_at gives is not finite for interior edges {first_few(wrong, len(wrong))}")
+    return found.detach()
 
 
 def normalised_directions(wanted: WantedDirections, unit: Normalisation) -> WantedDirections:

@@ -189,7 +189,8 @@ class FairProblem:
         version: tuple[float, ...],
         settings: ProjectionSettings,
     ) -> Stage:
-        self.guide.read(blocks["vertices"])
+        if self.settings.directions == "keep":
+            self.guide.read(blocks["vertices"])
         return Stage(
             name=name,
             blocks=blocks,

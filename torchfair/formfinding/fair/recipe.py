@@ -226,9 +226,12 @@ def minimise_normal_variation(
         constraints imposed step by step.
 
     Raises:
-        ShapeError: vertices are not ``(V, 3)``, or a handle is not a point.
+        ShapeError: vertices are not ``(V, 3)``, a handle is not a point, or what ``directions_at`` gives is not
+            ``(n, 3)``.
         MeshError: vertices are not finite, a face has no area, a handle or a fixed vertex is none or one is both, or
-            the reference is farther away than ``settings.reference_distance``.
+            the reference is farther away than ``settings.reference_distance``, or what ``directions_at`` gives is not
+            finite.
+        SettingsError: ``directions_at`` is given and ``settings.directions`` is not ``"keep"``.
 
     Example:
         >>> from torchfair.formfinding import minimise_normal_variation
@@ -241,6 +244,8 @@ def minimise_normal_variation(
         True
     """
     chosen = list(fixed)
+    if directions_at is not None and (settings or FairSettings()).directions != "keep":
+        raise SettingsError("directions_at has edges keep directions: give settings with directions='keep'")
 
     def begin() -> FairRecipe:
         return FairRecipe(
