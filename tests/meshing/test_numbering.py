@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 import torch
 from creased_shapes import box
-from helpers import random_rotation
+from helpers import grid_faces, random_rotation
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshing_tools import Mesh, ellipsoid, irregular, punched, shuffled, side_by_side
@@ -115,6 +115,26 @@ def test_rectangles_are_cut_from_the_corner_that_is_farthest_from_the_middle_of_
     """Sizes, diagonals and largest coordinates are the same either way."""
     (cut,) = cuts([[0, 0], [1, 0], [1, 1], [0, 1], [-3, -0.5]], [[0, 1, 2, 3], [0, 3, 4]])
     assert cut == {frozenset({0, 1, 2}), frozenset({0, 2, 3}), frozenset({0, 3, 4})}
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("before", [False, True])
+def test_what_else_is_in_a_mesh_decides_nothing(before: bool, size: float) -> None:
+    """Rectangles of squares are cut by ties, wherever the other component lies; components stay in order."""
+    x, y = torch.meshgrid(*(torch.arange(5, dtype=torch.float64),) * 2, indexing="ij")
+    plane = torch.stack([x, y, 0 * x], -1).reshape(-1, 3), Topology.from_faces(grid_faces(5, 5))
+    (alone,) = components_of(*plane)
+    patch = irregular(SADDLE, 60)
+    other = size * patch[0] + torch.tensor([9.0, -70.0, 4.0], dtype=torch.float64), patch[1]
+    first, second = (other, plane) if before else (plane, other)
+    offset = len(first[0])
+    faces = [*first[1].corners.view(first[1].num_faces, -1).tolist()]
+    faces += (second[1].corners.view(second[1].num_faces, -1) + offset).tolist()
+    unused = torch.full((1, 3), 1e5, dtype=torch.float64)
+    vertices = torch.cat([first[0], second[0], unused])
+    part = components_of(vertices, Topology.from_faces(faces, len(vertices)))[int(before)]
+    assert torch.equal(part.vertices, alone.vertices)
+    assert torch.equal(part.topology.triangles, alone.topology.triangles)
 
 
 @pytest.mark.parametrize("size", [5, 6, 8])

@@ -57,6 +57,15 @@ def test_the_pose_is_the_same_to_the_last_bit_after_motions(name: str, seed: int
     assert np.array_equal(one.confidence, other.confidence)
 
 
+@pytest.mark.parametrize("height", [1e-6, 1e-8, 1e-12])
+def test_thin_surfaces_have_a_pose(height: float) -> None:
+    """Also where all vertices are on the first axis but for less than what counts as equal."""
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, height, 0.0]])
+    pose = Pose.of(points, np.array([[0, 1, 2]]))
+    np.testing.assert_allclose(pose.axes @ pose.axes.T, np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(pose.placed @ pose.axes * pose.size + pose.origin, points, atol=1e-9)
+
+
 def test_it_is_a_rigid_motion_to_the_centroid() -> None:
     pose = part_of(moved(SHAPES["free form"], 1, 5.0)).pose
     assert np.allclose(pose.axes @ pose.axes.T, np.eye(3), atol=1e-14)

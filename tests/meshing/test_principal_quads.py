@@ -261,6 +261,31 @@ def test_a_moebius_strip_is_refused(tmp_path: Path) -> None:
         load_mesh(path, repair=True)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_single_triangle_is_meshed() -> None:
+    triangle = torch.tensor([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, 0.8, 0.0]], dtype=torch.float64)
+    mesh = principal_quads(triangle, Topology.from_faces([[0, 1, 2]]), count=50)
+    assert mesh.topology.num_faces == pytest.approx(50, rel=0.1)
+    areas = face_areas(mesh.vertices, mesh.topology)
+    assert float(areas.sum()) == pytest.approx(0.4, rel=1e-9)
+    assert shape_of(mesh.topology) == shape_of(Topology.from_faces([[0, 1, 2]]))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("height", [1e-6, 1e-9, 1e-11])
+def test_triangles_that_are_too_thin_are_refused_in_one_line(height: float) -> None:
+    sliver = torch.tensor([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, height, 0.0]], dtype=torch.float64)
+    with pytest.raises(NoMeshError, match=r"^no valid mesh[^\n]*$"):
+        principal_quads(sliver, Topology.from_faces([[0, 1, 2]]), count=100, settings=MeshingSettings(time_limit=1))
+
+
+@pytest.mark.parametrize("size", [1e-100, 1e100])
+def test_sizes_that_cannot_be_squared_are_refused(size: float) -> None:
+    vertices, topology = irregular(Flat(), 60)
+    with pytest.raises(MeshError, match="in another unit"):
+        principal_quads(size * vertices, topology, count=20)
+
+
 def test_what_is_wrong_with_the_input_is_said() -> None:
     vertices, topology = irregular(SADDLE)
     with pytest.raises(SettingsError, match="either count or spacing"):

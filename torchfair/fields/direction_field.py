@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from ..errors import MeshError
 from .directions import Directions
 from .frames import Complexes, FaceFrames, Floats, Ints
 
@@ -77,8 +78,17 @@ def connection_laplacian(frames: FaceFrames, turns: Complexes) -> sp.csr_matrix:
 
 
 def hermitian_solver(matrix: sp.csr_matrix) -> Callable[[Complexes], Complexes]:
-    """Solves a positive definite system for right sides, factorised once."""
-    factor = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    """Solves a positive definite system for right sides, factorised once.
+
+    Raises:
+        MeshError: if it is singular to rounding, as with triangles that hardly have an area.
+    """
+    try:
+        factor = splu(
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError:
+        raise MeshError("triangles are too thin to have directions") from None
     return lambda right: np.asarray(factor.solve(right))
 
 

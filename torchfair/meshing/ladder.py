@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import MeshError
+from ..errors import MeshError, SingularSystemError
 from ..fields import Directions
 from ..settings.meshing_settings import MeshingSettings
 from .attempt import FailedAttemptError, PieceMesh, Plan, attempt
@@ -133,7 +133,10 @@ class _Prepared:
         """
         graph = self._graph(plan.spacing, plan.smoothing, plan.creases, plan.even)
         creases, triangles = self._creases(plan.spacing, plan.creases), self._finer(plan.creases)[0]
-        return attempt(triangles, creases, graph, self.lattice, plan, self.settings)
+        try:
+            return attempt(triangles, creases, graph, self.lattice, plan, self.settings)
+        except SingularSystemError:
+            raise FailedAttemptError("triangles are too thin to be mapped to the plane") from None
 
     def _cut_finer(self, kept: bool) -> tuple[DesignSurface, Directions]:
         if kept or not self.surface.sharp.any():

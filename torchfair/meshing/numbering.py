@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from .._graph import face_components
 from ..fields.frames import Floats, Ints
 from ..topology import Topology
 from ..triangulation import triangulate
@@ -48,16 +49,26 @@ def numbered_by_geometry(points: Tensor, triangles: Tensor) -> tuple[Tensor, Ten
 
 
 def triangles_by_geometry(points: Tensor, topology: Topology) -> Tensor:
-    """Triangles (n, 3) of the faces of a mesh, the same wherever faces start and whatever is rounded.
+    """Triangles (n, 3) of the faces of a mesh in order, the same wherever faces start and whatever is rounded.
 
     Quads are cut as :func:`torchfair.triangulation.triangulate` cuts them, so that the smaller triangle is as large as
     it can be. Where it is as large either way, as in parallelograms, the shorter diagonal decides, then that with an
-    end farther from the middle of the mesh, then coordinates.
+    end farther from the middle of the component, then coordinates: what else is in the mesh decides nothing.
     """
     whole = triangulate(points, _turned(points, topology))
-    others = whole.triangles[topology.face_sizes[whole.faces] != 4]
-    quads = topology.faces_by_size.get(4)
-    return others if quads is None else torch.cat([others, _cut_quads(points.numpy(), quads[1].numpy())])
+    if 4 not in topology.faces_by_size:
+        return whole.triangles
+    is_other = topology.face_sizes[whole.faces] != 4
+    numbers, quads = (of.numpy() for of in topology.faces_by_size[4])
+    labels, sizes = face_components(topology).numpy(), topology.face_sizes.numpy()
+    corners, of_corners = topology.corners.numpy(), np.repeat(labels, sizes)
+    cut = np.empty((len(quads), 2, 3), np.int64)
+    for label in np.unique(labels[numbers]):
+        own, inside = labels[numbers] == label, np.unique(corners[of_corners == label])
+        cut[own] = _cut_quads(points.numpy(), quads[own], inside)
+    faces = np.concatenate([whole.faces[is_other].numpy(), np.repeat(numbers, 2)])
+    found = torch.cat([whole.triangles[is_other], torch.from_numpy(cut.reshape(-1, 3))])
+    return found[torch.from_numpy(np.argsort(faces, kind="stable"))]
 
 
 def _turned(points: Tensor, topology: Topology) -> Topology:
@@ -72,18 +83,19 @@ def _turned(points: Tensor, topology: Topology) -> Topology:
     return Topology.from_faces(faces, topology.num_vertices)
 
 
-def _cut_quads(points: Floats, corners: Ints) -> Tensor:
-    middle = points.mean(0)
-    far = np.linalg.norm(points - middle, axis=1)
-    size = far.max()
+def _cut_quads(points: Floats, corners: Ints, inside: Ints) -> Ints:
+    """(n, 2, 3) triangles of quads of a component with the vertices ``inside``."""
+    apart = points - points[inside].mean(0)
+    far = np.linalg.norm(apart, axis=1)
+    size = far[inside].max()
     fans = [np.roll(corners, -k, axis=1)[:, [[0, 1, 2], [0, 2, 3]]] for k in (0, 1)]
-    sides = [[*_signs(points, fan, size, far)] for fan in fans]
+    sides = [[*_signs(apart, fan, size, far)] for fan in fans]
     second, open_ = np.zeros(len(corners), bool), np.ones(len(corners), bool)
     for one, other in zip(*sides, strict=True):
         decides = open_ & (np.abs(other - one) > TIE)
         second[decides] = (other > one)[decides]
         open_ &= ~decides
-    return torch.from_numpy(np.where(second[:, None, None], fans[1], fans[0]).reshape(-1, 3))
+    return np.where(second[:, None, None], fans[1], fans[0])
 
 
 def _signs(points: Floats, fan: Ints, size: float, far: Floats) -> Iterator[Floats]:

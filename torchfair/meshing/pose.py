@@ -76,7 +76,11 @@ class Pose:
         first = apart[0] / _lengths(apart[0])
         beside = apart - (apart * first).sum(1, keepdims=True) * first
         off = _lengths(beside)
-        second = beside[np.argmax(off > off.max() - TIE)]
+        second = beside[np.argmax(off > off.max() - min(TIE, off.max() / 2))]
+        second = second / _lengths(second)
+        second = (
+            second - (second * first).sum() * first
+        )  # exact where all are near the first axis
         second = second / _lengths(second)
         axes = np.stack([first, second, np.cross(first, second)])
         lowest = (doubled / _lengths(np.roll(corners, -1, 1) - corners).max(1)).min()

@@ -26,6 +26,7 @@ from .pose import Pose, rounded
 from .sizes import SizeField
 
 _COARSE = 1.0  # mean edge over the spacing above which triangles are cut
+_LARGEST = 1e70  # extent of a surface, and one over the smallest: areas times coordinates stay in range
 _MOST_FACES = 40_000  # that are made by cutting
 
 
@@ -91,7 +92,7 @@ class DesignSurface:
     def cut_finer(self, directions: Directions, spacing: float) -> tuple[DesignSurface, Directions]:
         """Triangles fine enough for edges of a length, on the same flat pieces."""
         surface = self
-        while surface.frames.lengths.mean() > _COARSE * spacing and 4 * surface.topology.num_faces <= _MOST_FACES:
+        while _mean_edge(surface) > _COARSE * spacing and 4 * surface.topology.num_faces <= _MOST_FACES:
             finer = midpoint(surface.topology)
             new = torch.full((finer.topology.num_vertices - surface.topology.num_vertices,), -1)
             marks = torch.zeros(surface.topology.num_edges, dtype=torch.bool)
@@ -106,12 +107,19 @@ class DesignSurface:
         return surface, directions
 
 
+def _mean_edge(surface: DesignSurface) -> float:
+    """Of the interior edges; of all where there is one triangle."""
+    inner = surface.frames.lengths
+    return float(inner.mean() if len(inner) else edge_lengths(surface.vertices, surface.topology).mean())
+
+
 def components_of(vertices: Tensor, topology: Topology, crease_angle: float = 0.0) -> list[DesignSurface]:
     """The components of a mesh, triangulated, with edges that bend by more than an angle as creases (0 for none).
 
     Raises:
         ShapeError: if it is not one mesh.
-        MeshError: if there is no face, a coordinate is not finite, or a face has no area.
+        MeshError: if there is no face, a coordinate is not finite, a face has no area, or the surface is wider than
+            1e70 or less than 1e-70.
     """
     points, topology = one_mesh(vertices, topology).cpu().double(), topology.to("cpu")
     if not topology.num_faces:
@@ -119,6 +127,9 @@ def components_of(vertices: Tensor, topology: Topology, crease_angle: float = 0.
     if not points.isfinite().all():
         wrong = torch.nonzero(~points.isfinite().all(1)).squeeze(1).tolist()
         raise MeshError(f"vertices: not finite numbers: {first_few(wrong, len(wrong))}")
+    extent = float(np.ptp(points[topology.corners].numpy(), axis=0).max())
+    if not 1 / _LARGEST < extent < _LARGEST:
+        raise MeshError(f"the surface is {extent:.3g} wide, beyond what can be squared. Give it in another unit.")
     flat = torch.nonzero(degenerate_faces(points, topology)).squeeze(1).tolist()
     if flat:
         words = ". torchfair.repair_mesh (--repair) drops them; or remesh them."
