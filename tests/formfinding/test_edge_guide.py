@@ -61,6 +61,22 @@ def test_directions_are_those_where_the_edges_are_when_they_are_read():
     assert float(off(guide, polar).abs().max()) < 1e-12
 
 
+def test_sideways_is_within_the_surface_as_it_is_when_directions_are_read():
+    """Of a plane that was turned upright edges may bend out of that plane, not out of the one before."""
+    plane, topology = grid()
+    upright = plane[:, [0, 2, 1]]
+    guide = EdgeGuide(plane, topology, lambda middles, along: along)
+    guide.read(upright)
+    out = torch.sin(2 * upright.sum(1, keepdim=True)) * upright.new_tensor([0.0, 1.0, 0.0])
+    assert float(off(guide, upright + out).abs().max()) < 1e-12
+    assert float(off(guide, upright + out.roll(1, 1)).abs().max()) > 0.1
+
+
+def test_finer_meshes_ask_for_the_same_directions():
+    recipe = FairRecipe(*grid(), settings=FairSettings(directions="keep"), directions_at=around)
+    assert recipe.refined(recipe.state()).directions_at is around
+
+
 @pytest.mark.parametrize("wanted", [around, None])
 def test_terms_are_made_anew_for_directions_that_were_read_anew(wanted):
     """And only then."""

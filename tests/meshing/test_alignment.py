@@ -97,6 +97,19 @@ def test_adaptive_quads_stay(monkeypatch: pytest.MonkeyPatch) -> None:
         principal_quads(made.vertices, made.topology, count=60)
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_components_are_aligned_as_if_they_were_alone(noise: float) -> None:
+    """Whatever surface lies close by, and however rough it is, which smooths its own directions over more."""
+    surface = irregular_triangles(Catenoid(), 400)
+    shape, topology = surface.vertices, surface.topology
+    random = torch.randn(shape.shape, generator=torch.Generator().manual_seed(0), dtype=shape.dtype)
+    near = 1.02 * shape.flip(1) * torch.tensor([1.0, 1.0, -1.0]) + noise * random
+    faces = torch.cat([topology.triangles, topology.triangles + len(shape)])
+    both = torch.cat([near, shape]), Topology.from_faces(faces)
+    alone, beside = (principal_quads(*of, spacing=0.4).vertices for of in ((shape, topology), both))
+    torch.testing.assert_close(beside[-len(alone) :], alone, atol=1e-9, rtol=0)
+
+
 def test_singular_points_go_with_their_vertices() -> None:
     surface, topology = ellipsoid()
     mesh = principal_quads(surface, topology, count=120)

@@ -66,6 +66,13 @@ def test_thin_surfaces_have_a_pose(height: float) -> None:
     np.testing.assert_allclose(pose.placed @ pose.axes * pose.size + pose.origin, points, atol=1e-9)
 
 
+def test_vertices_come_back_to_the_last_bit() -> None:
+    """Also far from the origin, where a motion there and back would round them."""
+    vertices, topology = moved(SHAPES["ellipsoid"], 5, 100 / 7)
+    part = part_of((vertices, topology))
+    assert np.array_equal(part.pose.back(part.pose.placed), part.vertices.numpy())
+
+
 def test_it_is_a_rigid_motion_to_the_centroid() -> None:
     pose = part_of(moved(SHAPES["free form"], 1, 5.0)).pose
     assert np.allclose(pose.axes @ pose.axes.T, np.eye(3), atol=1e-14)

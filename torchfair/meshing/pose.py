@@ -78,9 +78,7 @@ class Pose:
         off = _lengths(beside)
         second = beside[np.argmax(off > off.max() - min(TIE, off.max() / 2))]
         second = second / _lengths(second)
-        second = (
-            second - (second * first).sum() * first
-        )  # exact where all are near the first axis
+        second = second - (second * first).sum() * first  # exact where all are near the first axis
         second = second / _lengths(second)
         axes = np.stack([first, second, np.cross(first, second)])
         lowest = (doubled / _lengths(np.roll(corners, -1, 1) - corners).max(1)).min()
