@@ -65,7 +65,7 @@ def triangles_by_geometry(points: Tensor, topology: Topology) -> Tensor:
     cut = np.empty((len(quads), 2, 3), np.int64)
     for label in np.unique(labels[numbers]):
         own, inside = labels[numbers] == label, np.unique(corners[of_corners == label])
-        cut[own] = _cut_quads(points.numpy(), quads[own], inside)
+        cut[own] = inside[_cut_quads(points[inside].numpy(), np.searchsorted(inside, quads[own]))]
     faces = np.concatenate([whole.faces[is_other].numpy(), np.repeat(numbers, 2)])
     found = torch.cat([whole.triangles[is_other], torch.from_numpy(cut.reshape(-1, 3))])
     return found[torch.from_numpy(np.argsort(faces, kind="stable"))]
@@ -83,11 +83,11 @@ def _turned(points: Tensor, topology: Topology) -> Topology:
     return Topology.from_faces(faces, topology.num_vertices)
 
 
-def _cut_quads(points: Floats, corners: Ints, inside: Ints) -> Ints:
-    """(n, 2, 3) triangles of quads of a component with the vertices ``inside``."""
-    apart = points - points[inside].mean(0)
+def _cut_quads(points: Floats, corners: Ints) -> Ints:
+    """(n, 2, 3) triangles of the quads of a component."""
+    apart = points - points.mean(0)
     far = np.linalg.norm(apart, axis=1)
-    size = far[inside].max()
+    size = far.max()
     fans = [np.roll(corners, -k, axis=1)[:, [[0, 1, 2], [0, 2, 3]]] for k in (0, 1)]
     sides = [[*_signs(apart, fan, size, far)] for fan in fans]
     second, open_ = np.zeros(len(corners), bool), np.ones(len(corners), bool)
