@@ -8,7 +8,6 @@ from typing import Any, overload
 
 import numpy as np
 import torch
-from scipy.spatial import KDTree
 
 from ..fields import Directions
 from ..fields.frames import Complexes, Floats, Ints
@@ -90,10 +89,9 @@ class Pose:
         """Points (n, 3) on the surface in the pose where they were on the given one, vertices exactly there."""
         if not len(points):
             return points
-        gaps, nearest = KDTree(self.placed).query(points)
         closest = self._surface.closest(torch.from_numpy(points))
         lost = (closest.weights.numpy()[..., None] * self._lost[self.triangles[closest.faces.numpy()]]).sum(1)
-        return np.where(np.equal(gaps, 0)[:, None], self.given[nearest], self._moved(points) + lost)
+        return np.asarray(self._moved(points) + lost)
 
     def _moved(self, points: Floats) -> Floats:
         return _combined(points, self.axes) * self.size + self.origin
