@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.cameras import Camera
-from torchfair.fields import directions_of
+from torchfair.fields import FaceFrames, directions_of
 from torchfair.formfinding import planar_quads
 from torchfair.meshing import QuadMesh, attempt, principal_quads
 from torchfair.meshing.seamless_map import SeamlessMap
@@ -53,6 +54,12 @@ def maps_seen() -> Iterator[list[SeamlessMap]]:
         yield seen
     finally:
         attempt.trace_cells = trace
+
+
+def back_on_the_surface(found: SeamlessMap, made: QuadMesh) -> SeamlessMap:
+    """A map of a surface of one component, which was made in its pose, where the surface is."""
+    placed, pose = found.frames, made.surface.parts[0].pose
+    return replace(found, frames=FaceFrames.of(torch.from_numpy(pose.back(placed.points)), placed.topology))
 
 
 # ---- lines on the surface ------------------------------------------------------------------------------
@@ -191,7 +198,9 @@ def draw_stages(path: Path) -> None:
     with maps_seen() as seen:
         made = principal_quads(*surface, count=350)
     planar, _ = planar_quads(made, surface)
-    write(path, stages(surface, made, planar, seen[-1], *camera_for(surface, STAGE)), 3, STAGE)
+    write(
+        path, stages(surface, made, planar, back_on_the_surface(seen[-1], made), *camera_for(surface, STAGE)), 3, STAGE
+    )
 
 
 def draw_ends(path: Path) -> None:
