@@ -29,7 +29,7 @@ def row_distance(frames: FaceFrames, directions: Directions) -> float:
     """Distance of rows over the spacing: E exceeds C by ``|a| / (2 ratio^2)`` where K is negative."""
     larger, smaller = _integrals(frames, directions)
     total = float(larger + smaller)
-    return float(rounded(_ratio(np.array(min(larger, smaller) / total)))) if total > 0 else EQUILATERAL
+    return float(_ratio(rounded(np.array(min(larger, smaller) / total)))) if total > 0 else EQUILATERAL
 
 
 def row_sizes(
