@@ -31,6 +31,19 @@ def edits(rows: int = 4, columns: int = 4, fixed: tuple[int, ...] = ()) -> Polyg
     return PolygonEdits(positions, faces, outer, keep)
 
 
+def test_areas_of_all_faces_are_those_of_each() -> None:
+    """Also once they were changed, over what differs from node to node; 0 without a normal."""
+    found = edits()
+    assert found.collapse((5, 1))
+    assert found.collapse((6, 2))
+    found.positions[:, 2] = np.sin(5 * found.positions[:, 0])
+    found.normals[4] = np.zeros(3)
+    full = np.linspace(1, 2, len(found.positions))
+    each = [found.area(number) / full[face].min() for number, face in found.faces.items()]
+    assert len(set(map(len, found.faces.values()))) > 1
+    np.testing.assert_allclose(found.areas_over(full), each, rtol=1e-12)
+
+
 def is_disk(of: PolygonEdits) -> bool:
     whole = compact(of)
     topology = Topology.from_faces(whole.faces, len(whole.positions))

@@ -63,14 +63,10 @@ def _collapse_short(edits: PolygonEdits, lengths: Floats, most: float) -> int:
 
 def _join_small(edits: PolygonEdits, areas: Floats) -> int:
     """Joins faces at curves below an area with the neighbour across their longest side, or collapses their shortest."""
-
-    def share(number: int) -> float:
-        return edits.area(number) / float(areas[edits.faces[number]].min())
-
-    least = max(_SMALL, _SMALLEST * math.fsum(map(share, edits.faces)) / max(len(edits.faces), 1))
+    least = max(_SMALL, _SMALLEST * float(edits.areas_over(areas).mean())) if edits.faces else _SMALL
     done = 0
     for number in sorted(edits.curve_faces(), key=edits.area):
-        if number not in edits.faces or share(number) >= least:
+        if number not in edits.faces or edits.area(number) >= least * areas[edits.faces[number]].min():
             continue
         sides = sorted(edits.sides(number), key=edits.length)
         inner = [edge for edge in sides if edits.across(edge, number) is not None]
