@@ -32,14 +32,9 @@ class EdgeGuide:
     """
 
     def __init__(self, vertices: Tensor, topology: Topology, wanted: WantedDirections | None = None) -> None:
-        self._topology, self._wanted = topology, wanted
-        self._every = torch.arange(topology.num_interior_edges)
-        self._start = self._along(vertices)
-        self._at, self._directions, self.version = vertices, self._start, 0
-
-    def _along(self, vertices: Tensor) -> Tensor:
-        ends = vertices[self._topology.interior_edges]
-        return ends[:, 1] - ends[:, 0]
+        self._start, self._topology, self._wanted = vertices, topology, wanted
+        self._at, self.version = vertices, 0
+        self._directions: Tensor | None = None  # those of the start
 
     def read(self, vertices: Tensor) -> None:
         """Reads off what is wanted where a mesh (V, 3) is.
@@ -50,15 +45,21 @@ class EdgeGuide:
         """
         if self._wanted is None:
             return
-        found = self._wanted(vertices[self._topology.interior_edges].mean(1), self._along(vertices))
-        found = _checked(found, len(self._every)).to(self._start)
+        ends = self._topology.interior_edges
+        found = self._wanted(vertices[ends].mean(1), _along(vertices, ends))
+        found = _checked(found, len(ends)).to(self._start)
         has = (found != 0.0).any(1, keepdim=True)
-        self._at, self._directions = vertices, torch.where(has, found, self._start)
+        self._at, self._directions = vertices, torch.where(has, found, _along(self._start, ends))
         self.version += 1
 
     def terms(self, *, weight: float) -> list[ElementTerm]:
         """How far edges are sideways of their directions, see :func:`.edge_direction_terms`."""
-        return edge_direction_terms(self._at, self._topology, self._every, along=self._directions, weight=weight)
+        every = torch.arange(self._topology.num_interior_edges)
+        return edge_direction_terms(self._at, self._topology, every, along=self._directions, weight=weight)
+
+
+def _along(vertices: Tensor, ends: Tensor) -> Tensor:
+    return vertices[ends[:, 1]] - vertices[ends[:, 0]]
 
 
 def _checked(found: object, count: int) -> Tensor:
