@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -11,10 +14,20 @@ from meshing_tools import Mesh, ellipsoid, irregular, shuffled
 from torch import Tensor
 
 from torchfair.fields import Directions
-from torchfair.meshing import MeshingSettings, QuadMesh, TriangleMesh, principal_quads, principal_triangles
+from torchfair.meshing import (
+    MeshingSettings,
+    NoMeshError,
+    QuadMesh,
+    TriangleMesh,
+    ladder,
+    principal_quads,
+    principal_triangles,
+)
+from torchfair.meshing.attempt import FailedAttemptError, PieceMesh
 from torchfair.meshing.components import read_surface
 from torchfair.meshing.numbering import numbered_by_geometry
 from torchfair.meshing.pose import Pose
+from torchfair.meshing.row_distances import row_distance
 from torchfair.meshing.surface import DesignSurface, components_of
 from torchfair.shapes import FreeFormPatch, PrincipalParaboloid
 
@@ -106,6 +119,38 @@ def test_what_is_flat_but_for_rounding_has_no_directions() -> None:
     noise = 1e-12 * np.exp(1j * np.arange(6.0)).reshape(2, 3)
     found = pose.directions(Directions(noise, np.full(2, 1e-12), np.full(2, 1e-18)))
     assert not any(of.any() for of in (found.at_corners, found.means, found.confidence))
+
+
+def test_rows_are_as_far_apart_to_the_last_bit_after_motions() -> None:
+    """Their distance is chosen before a surface is placed."""
+    meshes = [SHAPES["saddle"], *(moved(SHAPES["saddle"], seed, 1000 / 7) for seed in range(5))]
+    read = [read_surface(*mesh, MeshingSettings()) for mesh in meshes]
+    assert len({row_distance(of.frames, of.directions) for of in read}) == 1
+
+
+@pytest.mark.parametrize("failures", [1, 10**9])
+def test_places_are_told_where_the_surface_is(failures: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In notes on creases that are lines no more, and where nothing was found: they are known in the pose."""
+    vertices, topology = moved(SHAPES["box"], 4, 10.0)
+    settings, attempt, left = MeshingSettings(crease_angle=0.5), ladder.attempt, [failures]
+    first = part_of((vertices, topology)).vertices[0]
+
+    def failing(surface: DesignSurface, *others: Any) -> PieceMesh:
+        left[0] -= 1
+        if left[0] >= 0:
+            raise FailedAttemptError("no room", 0, surface.vertices[0].numpy())
+        return attempt(surface, *others)
+
+    monkeypatch.setattr(ladder, "attempt", failing)
+    try:
+        told = " ".join(principal_quads(vertices, topology, count=150, settings=settings).notes)
+        assert "creases not aligned near (" in told
+    except NoMeshError as error:
+        told = str(error)
+        assert failures > 1
+    numbers = re.search(r"near (?:vertex 0 at )?\((.*?)\)", told)
+    assert numbers is not None
+    assert np.allclose([float(of) for of in numbers[1].split(", ")], first.numpy(), rtol=5e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))
