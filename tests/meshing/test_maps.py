@@ -69,6 +69,14 @@ def test_cut_open_a_surface_is_a_disk(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SHAPES)
+def test_cuts_end_at_singular_vertices_and_boundaries_alone(name: str) -> None:
+    frames, graph = cut(*SHAPES[name])
+    ends = np.bincount(frames.edges[graph.cut].ravel(), minlength=len(frames.points)) == 1
+    assert (graph.nodes | frames.is_boundary)[ends].all()
+    assert graph.cut.any() == bool(graph.nodes.any() or len(frames.topology.boundary_loops()) > 1 or name == "torus")
+
+
+@pytest.mark.parametrize("name", SHAPES)
 def test_maps_fit_together_over_the_cuts(name: str) -> None:
     frames, graph = cut(*SHAPES[name])
     problem, _ = problem_of(frames, graph, 0.2)

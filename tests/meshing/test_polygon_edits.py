@@ -10,6 +10,7 @@ from helpers import grid_faces
 
 from torchfair import Topology
 from torchfair.meshing.boundary_cells import compact, tidy_boundary
+from torchfair.meshing.polygon_area import area_vector, area_vectors
 from torchfair.meshing.polygon_edits import PolygonEdits
 from torchfair.meshing.tracing import Cells
 
@@ -29,6 +30,16 @@ def edits(rows: int = 4, columns: int = 4, fixed: tuple[int, ...] = ()) -> Polyg
     keep = np.zeros(len(positions), bool)
     keep[list(fixed)] = True
     return PolygonEdits(positions, faces, outer, keep)
+
+
+def test_area_vectors_of_all_faces_are_those_of_each_also_far_away() -> None:
+    random = np.random.default_rng(0)
+    positions = random.normal(size=(40, 3)) + 1e6
+    faces = [random.permutation(40)[:size].tolist() for size in (3, 7, 4, 4, 5, 3)]
+    each = np.array([area_vector(positions, face) for face in faces])
+    assert np.abs(area_vectors(positions, faces) - each).max() < 1e-12
+    assert np.abs(area_vectors(positions, faces[:1]) - each[:1]).max() < 1e-12
+    assert area_vectors(positions, []).shape == (0, 3)
 
 
 def test_areas_of_all_faces_are_those_of_each() -> None:

@@ -53,14 +53,8 @@ def cut_open(frames: FaceFrames, angles: Floats, matched: Ints, charges: Ints) -
         matched: (I,) quarter turns over edges.
         charges: (V,) of the vertices.
     """
-    tree, order, parents = _dual_tree(frames)
-    turned = np.zeros(len(frames.triangles), np.int64)
-    left = frames.faces[:, 0]
-    for face in order[1:].tolist():
-        edge = parents[face]
-        step = matched[edge]
-        other = turned[frames.faces[edge].sum() - face]
-        turned[face] = other + step if left[edge] == face else other - step
+    tree, parents = _dual_tree(frames)
+    turned = _turned_along(frames, parents, matched)
     f, g = frames.faces.T
     quarters = matched + turned[g] - turned[f]
     singular = charges != 0
@@ -78,12 +72,12 @@ def dual_graph(frames: FaceFrames) -> sp.csr_matrix:
     return sp.csr_matrix((np.r_[lengths, lengths], (np.r_[f, g], np.r_[g, f])), shape=(count, count))
 
 
-def _dual_tree(frames: FaceFrames) -> tuple[Bools, Ints, Ints]:
-    """Edges of a tree of shortest paths over the faces from the middle, faces in its order, and edges to parents."""
+def _dual_tree(frames: FaceFrames) -> tuple[Bools, Ints]:
+    """Edges of a tree of shortest paths over the faces from the middle, and (F,) edges to parents, -1 at the root."""
     f, g = frames.faces.T
     centres = frames.centres
     middle = int(np.argmin(((centres - frames.areas @ centres / frames.areas.sum()) ** 2).sum(1)))
-    distance, before = dijkstra(dual_graph(frames), True, np.array(middle), True)
+    before = dijkstra(dual_graph(frames), True, np.array(middle), True)[1]
     number = np.full(len(centres), -1)
     edges = np.arange(len(f))
     towards_g, towards_f = before[g] == f, before[f] == g
@@ -91,28 +85,41 @@ def _dual_tree(frames: FaceFrames) -> tuple[Bools, Ints, Ints]:
     number[f[towards_f]] = edges[towards_f]
     tree = np.zeros(len(f), bool)
     tree[number[number >= 0]] = True
-    return tree, np.argsort(distance, kind="stable"), number
+    return tree, number
+
+
+def _turned_along(frames: FaceFrames, parents: Ints, matched: Ints) -> Ints:
+    """(F,) quarter turns of faces against the root of a tree, with which its edges match.
+
+    Args:
+        frames: of the triangles.
+        parents: (F,) edges of the tree, see :func:`_dual_tree`.
+        matched: (I,) quarter turns over edges.
+    """
+    face, inner = np.arange(len(parents)), parents >= 0
+    edge, child = parents[inner], face[inner]
+    is_left = frames.faces[edge, 0] == child
+    above = face.copy()
+    above[child] = frames.faces[edge].sum(1) - child
+    turned = np.zeros(len(parents), np.int64)
+    turned[child] = np.where(is_left, matched[edge], -matched[edge])
+    while (above[above] != above).any():  # twice as far up each time, the root has no turns to add
+        turned, above = turned + turned[above], above[above]
+    return turned
 
 
 def _prune(frames: FaceFrames, cut: Bools, singular: Bools) -> None:
     """Takes loose ends off the cut, in place: those that reach neither a singular vertex nor the boundary."""
-    edges = frames.edges.tolist()
-    around: dict[int, list[int]] = defaultdict(list)
-    for edge in np.flatnonzero(cut).tolist():
-        for vertex in edges[edge]:
-            around[vertex].append(edge)
     stays = singular | frames.is_boundary
-    loose = [vertex for vertex, at in around.items() if len(at) == 1 and not stays[vertex]]
-    while loose:
-        vertex = loose.pop()
-        if len(around[vertex]) != 1:
-            continue
-        edge = around[vertex].pop()
-        cut[edge] = False
-        other = edges[edge][0] + edges[edge][1] - vertex
-        around[other].remove(edge)
-        if len(around[other]) == 1 and not stays[other]:
-            loose.append(other)
+    left = np.flatnonzero(cut)
+    while True:
+        ends = frames.edges[left]
+        loose = (np.bincount(ends.ravel(), minlength=len(stays)) == 1) & ~stays
+        gone = loose[ends].any(1)
+        if not gone.any():
+            return
+        cut[left[gone]] = False
+        left = left[~gone]
 
 
 def _paths(frames: FaceFrames, cut: Bools, singular: Bools) -> tuple[dict[int, PathEdge], int]:

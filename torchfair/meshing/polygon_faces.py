@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from itertools import chain
 
 import numpy as np
 
 from ..fields.frames import Bools, Floats, Ints
 from .edge_directions import EdgeDirections
-from .polygon_area import area_vector
+from .polygon_area import area_vector, area_vectors, joined
 
 Edge = tuple[int, int]
 
@@ -46,7 +45,7 @@ class PolygonFaces:
         for number, face in self.faces.items():
             for node in face:
                 self.around[node].add(number)
-        self.normals = {number: area_vector(self.positions, face) for number, face in self.faces.items()}
+        self.normals = dict(zip(self.faces, area_vectors(self.positions, faces), strict=True))
         self.directions = EdgeDirections(positions)
 
     def place_of(self, node: int) -> int:
@@ -63,19 +62,20 @@ class PolygonFaces:
 
     def areas_over(self, full: Floats) -> Floats:
         """Areas of all faces in their order, each as :meth:`area`, over the smallest of some (N,) at their nodes."""
-        sizes = np.fromiter(map(len, self.faces.values()), np.int64)
-        starts = np.cumsum(sizes) - sizes
-        nodes = np.fromiter(chain.from_iterable(self.faces.values()), np.int64)
-        apart = self.positions[nodes] - np.repeat(self.positions[nodes[starts]], sizes, axis=0)
-        doubled = np.add.reduceat(np.cross(apart, np.roll(apart, -1, axis=0)), starts)  # the first of each is zero
+        areas = area_vectors(self.positions, self.faces.values())
         first = np.array([self.normals[number] for number in self.faces])
         size = np.linalg.norm(first, axis=1)
-        along = (doubled * first).sum(1) / np.where(size > 0, 2 * size, np.inf)
+        along = (areas * first).sum(1) / np.where(size > 0, size, np.inf)
+        nodes, starts = joined(self.faces.values())
         return np.asarray(along / np.minimum.reduceat(full[nodes], starts))
 
     def curve_faces(self) -> list[int]:
         """Faces with a node on the boundary or on a crease."""
-        return [number for number, face in self.faces.items() if self.on_curve[face].any()]
+        nodes, starts = joined(self.faces.values())
+        if not len(nodes):
+            return []
+        has_one = np.logical_or.reduceat(self.on_curve[nodes], starts)
+        return [number for number, at in zip(self.faces, has_one, strict=True) if at]
 
     def sides(self, number: int) -> Iterator[Edge]:
         """The edges of a face."""
