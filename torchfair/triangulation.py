@@ -41,6 +41,8 @@ def triangulate(vertices: Tensor, topology: Topology) -> Triangulation:
         faces.append(numbers.repeat_interleave(size - 2))
     if not triangles:
         return Triangulation(topology.corners.view(0, 3).expand(*vertices.shape[:-2], 0, 3), topology.corners)
+    if len(triangles) == 1:  # in the order of the faces already
+        return Triangulation(triangles[0], faces[0])
     order = torch.cat(faces).argsort(stable=True)
     return Triangulation(torch.cat(triangles, dim=-2)[..., order, :], torch.cat(faces)[order])
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import torch
@@ -172,3 +174,43 @@ def test_triangles_scanned_some_at_a_time_cover_the_same_pixels(monkeypatch: pyt
     monkeypatch.setattr(scan, "_TRIANGLES", 7)
     for mine, expected in zip(triangle_spans(points, triangles, 40, 30), whole, strict=True):
         assert torch.equal(mine, expected)
+
+
+def spans_one_by_one(points: Tensor, triangles: Tensor, width: int, height: int) -> list[tuple[int, int, int, int]]:
+    """Triangle, row, first pixel and length of all runs, by crossings of the three edges at every row."""
+    found = []
+    for number, corners in enumerate(points.double()[triangles].tolist()):
+        if not all(math.isfinite(value) for corner in corners for value in corner):
+            continue
+        for row in range(height):
+            crossings = []
+            for k in range(3):
+                upper, lower = sorted((corners[k], corners[k - 2]), key=lambda corner: corner[1])
+                if upper[1] <= row + 0.5 < lower[1]:
+                    slope = (lower[0] - upper[0]) / (lower[1] - upper[1])
+                    crossings.append(upper[0] + (row + 0.5 - upper[1]) * slope)
+            if crossings:
+                start, stop = (min(max(math.ceil(x - 0.5), 0), width) for x in (min(crossings), max(crossings)))
+                if stop > start:
+                    found.append((number, row, start, stop - start))
+    return found
+
+
+@pytest.mark.parametrize("case", range(12))
+def test_spans_against_crossings_of_edges_one_by_one(case: int) -> None:
+    torch.manual_seed(case)
+    points = torch.rand(20, 3, dtype=DOUBLE) * torch.tensor([50.0, 40, 3]) - 5
+    if case % 3 == 0:
+        points = (2 * points).round() / 2  # on pixel centres and borders, with level edges
+    if case % 4 == 1:
+        points = points.float()
+    if case % 5 == 0:
+        points = 1e3 * (points - 15) + 15
+    if case % 2:
+        points[3, 0], points[7, 1], points[11, 2] = math.nan, math.inf, -math.inf
+    triangles = torch.randint(0, 20, (60, 3))
+    spans = triangle_spans(points, triangles, 37, 29)
+    columns = torch.stack([spans.triangle, spans.row, spans.start, spans.length], 1)
+    expected = spans_one_by_one(points, triangles, 37, 29)
+    assert expected
+    assert list(map(tuple, columns.tolist())) == expected

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import sys
 
 import pytest
 import torch
@@ -19,6 +21,9 @@ from torchfair.reflection import (
     reflection_variation,
     reflection_variation_from_eyes,
 )
+from torchfair.shapes import icosphere
+
+visibility = sys.modules["torchfair.reflection.edge_visibility"]  # the package has a function of that name
 
 
 def from_afar(
@@ -159,3 +164,36 @@ def test_wrong_arguments_are_named():
         edge_visibility(vertices, topology, camera, size=0)
     with pytest.raises(ShapeError, match="one mesh"):
         edge_visibility(vertices[None], topology, camera)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e6])
+@pytest.mark.parametrize("size", [12, 24, 64])
+def test_edges_that_are_settled_as_a_whole_have_the_shares_of_their_points(
+    offset: float, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Short edges are told by the pixels around them, and no point of them is otherwise."""
+    views = axis_directions() @ random_rotation(2).T
+    ball = icosphere(3)
+    meshes = [cube(), random_polytope(1), torus(), wavy_grid(9, 8), (ball.vertices, ball.topology)]
+    told = 0
+    for vertices, topology in meshes:
+        vertices = vertices.to(DOUBLE) + offset
+        camera = OrthographicCamera.fit(vertices, directions=views)
+        narrow = dataclasses.replace(camera, half_widths=0.7 * camera.half_widths)  # edges beside the picture, too
+        for chosen in (camera, narrow):
+            with monkeypatch.context() as patch:
+                patch.setattr(visibility, "_settle", lambda share, left, *others: left)
+                expected = edge_visibility(vertices, topology, chosen, size=size)
+            counts = []
+            settle = visibility._settle
+
+            def counting(share, left, *others, settle=settle, counts=counts):
+                rest = settle(share, left, *others)
+                counts.append(len(left) - len(rest))
+                return rest
+
+            with monkeypatch.context() as patch:
+                patch.setattr(visibility, "_settle", counting)
+                assert torch.equal(edge_visibility(vertices, topology, chosen, size=size), expected)
+            told += sum(counts)
+    assert told > 500

@@ -18,13 +18,18 @@ CAMERA = OrthographicCamera(torch.tensor([[0.1, 0.2, -1.0], [-0.3, 0.1, -1]], dt
 def rendered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Shadings of all pictures that are rendered, in order."""
     shadings: list[str] = []
-    original = rendering.render_reflection
+    one, several = rendering.render_reflection, rendering.render_shadings
 
     def counting(*arguments: object, **options: object) -> object:
         shadings.append(str(options.get("shading", "flat")))
-        return original(*arguments, **options)
+        return one(*arguments, **options)
+
+    def counting_several(*arguments: object) -> object:
+        shadings.extend(arguments[-1])
+        return several(*arguments)
 
     monkeypatch.setattr(rendering, "render_reflection", counting)
+    monkeypatch.setattr(rendering, "render_shadings", counting_several)
     return shadings
 
 

@@ -13,6 +13,7 @@ from helpers import DOUBLE, cube, random_rotation, wavy_grid
 
 from torchfair import ShapeError, Topology, TorchfairError
 from torchfair.geometry import face_areas
+from torchfair.rasterisation import visible_triangles
 from torchfair.reflection import (
     OrthographicCamera,
     PerspectiveCamera,
@@ -26,6 +27,7 @@ from torchfair.reflection import (
     reflection_variation,
 )
 from torchfair.shapes import (
+    Catenoid,
     PrincipalParaboloid,
     Sphere,
     irregular_triangles,
@@ -33,6 +35,7 @@ from torchfair.shapes import (
     principal_triangles,
     rotated_lattice,
 )
+from torchfair.triangulation import triangulate
 
 SADDLE = PrincipalParaboloid(1.0, -0.5, (0.8, 0.8))
 SMALL = {"size": 96, "supersampling": 2}
@@ -290,3 +293,18 @@ def test_sampled_surface_is_the_surface_also_at_poles():
     reference = SmoothReference.of_surface(Sphere(2.0), 24)
     torch.testing.assert_close(reference.normals, reference.vertices / 2)
     assert replace(reference).topology is reference.topology
+
+
+def test_pictures_compared_are_those_rendered_one_by_one() -> None:
+    mesh = irregular_triangles(PrincipalParaboloid(1.0, -0.5, (0.8, 0.8)), 60)
+    other = principal_quads(Catenoid(), 6, 12)
+    for vertices, topology in ((mesh.vertices, mesh.topology), (other.vertices, other.topology)):
+        reference = SmoothReference.of_mesh(vertices, topology)
+        chosen = ReflectionSetup.for_reference(reference, size=(40, 48), supersampling=2)
+        for setup in (chosen, chosen.without_reference()):
+            flat, smooth, triangles = setup.compared(vertices, topology)
+            assert all(map(torch.equal, flat, setup.flat(vertices, topology)))
+            assert all(map(torch.equal, smooth, setup.pictures_to_match(vertices, topology)))
+            cut = triangulate(vertices, topology).triangles
+            for seen, points in zip(triangles, setup.camera.project(vertices, (80, 96)), strict=True):
+                assert torch.equal(seen, visible_triangles(points, cut, 96, 80))

@@ -36,6 +36,10 @@ class PlaneTable(NamedTuple):
         depth = z + ((places[:, 0] - x) * right + (places[:, 1] - y) * down)
         return torch.clamp(depth, nearest, farthest), slope
 
+    def nearest(self) -> Tensor:
+        """(n,) least depths of the triangles."""
+        return self.rows[:, 5]
+
     def farthest(self) -> Tensor:
         """(n,) largest depths of the triangles."""
         return self.rows[:, 6]

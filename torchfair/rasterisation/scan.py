@@ -41,29 +41,68 @@ def triangle_spans(points: Tensor, triangles: Tensor, width: int, height: int) -
           /____\
     """
     portion = _TRIANGLES if triangles.is_cpu else max(triangles.shape[0], 1)
+    screen = _Screen.of(points, width, height)
     some = enumerate(torch.split(triangles, portion))
-    parts = [_spans(points, chosen, number * portion, width, height) for number, chosen in some]
+    parts = [_spans(screen, chosen, number * portion) for number, chosen in some]
     return parts[0] if len(parts) == 1 else Spans(*(torch.cat(columns) for columns in zip(*parts, strict=True)))
 
 
-def _spans(points: Tensor, triangles: Tensor, before: int, width: int, height: int) -> Spans:
+class _Screen(NamedTuple):
+    """Points of a picture, coordinate by coordinate, each one's first row and columns, worked out once.
+
+    Attributes:
+        place: x, y and depth (P,) of each, float64.
+        left: (P,) first column at or beyond x less some slack, int32 as all numbers of pixels here.
+        right: (P,) the same with x and that slack.
+        row: (P,) first row at or beyond y.
+        usable: (P,) whether all three are finite; None if that is so of all points.
+        width: of the picture.
+    """
+
+    place: tuple[Tensor, Tensor, Tensor]
+    left: Tensor
+    right: Tensor
+    row: Tensor
+    usable: Tensor | None
+    width: int
+
+    @classmethod
+    def of(cls, points: Tensor, width: int, height: int) -> _Screen:
+        """With points (P, 3)."""
+        x, y, depth = points.detach().to(torch.float64).T.contiguous().unbind(0)
+        usable = torch.isfinite(x) & torch.isfinite(y) & torch.isfinite(depth)
+        every = bool(usable.all())
+        if not every:
+            x, y, depth = (torch.where(usable, part, 0) for part in (x, y, depth))
+        left, right, row = (
+            _first_centre(part, size).to(torch.int32)
+            for part, size in ((x - _SLACK, width), (x + _SLACK, width), (y, height))
+        )
+        return cls((x, y, depth), left, right, row, None if every else usable, width)
+
+
+def _spans(screen: _Screen, triangles: Tensor, before: int) -> Spans:
     """Those of some triangles, of which so many come before."""
-    corners = points.detach()[triangles].to(torch.float64)
-    corners = torch.where(torch.isfinite(corners).all(-1).all(-1)[:, None, None], corners, 0)
-    (left_end, top), (right_end, bottom) = (
-        (_first_centre(x, width), _first_centre(y, height))
-        for x, y in ((_least(corners, 0) - _SLACK, _least(corners, 1)), (_most(corners, 0) + _SLACK, _most(corners, 1)))
-    )
-    chosen = torch.nonzero((bottom > top) & (right_end > left_end)).squeeze(1)
-    corners, top, bottom = corners[chosen], top[chosen], bottom[chosen]
+    corners = triangles.T.contiguous().unbind(0)
+    tops = [screen.row.index_select(0, corner) for corner in corners]
+    top, bottom = _least(*tops), _most(*tops)
+    left_end = _least(*(screen.left.index_select(0, corner) for corner in corners))
+    right_end = _most(*(screen.right.index_select(0, corner) for corner in corners))
+    may_cover = (bottom > top) & (right_end > left_end)
+    if screen.usable is not None:
+        may_cover &= screen.usable[triangles].all(1)
+    chosen = torch.nonzero(may_cover).squeeze(1)
+    kept = [corner.index_select(0, chosen) for corner in corners]
+    top, bottom = (end.index_select(0, chosen).to(torch.int64) for end in (top, bottom))
+    x, y, depth = ([part.index_select(0, corner) for corner in kept] for part in screen.place)
     triangle, offset = expand_counts(bottom - top)
-    row = top[triangle] + offset
-    left, right = _crossings(corners, triangle, row.to(torch.float64) + 0.5)
-    start, stop = _first_centre(left, width), _first_centre(right, width)
-    filled = stop > start
-    triangle, row, start, stop = triangle[filled], row[filled], start[filled], stop[filled]
-    depth, step = _depths(corners, triangle, row, start, stop)
-    return Spans(chosen[triangle] + before, row, start, stop - start, depth, step)
+    row = top.index_select(0, triangle) + offset
+    left, right = _crossings(x, y, triangle, row.to(torch.float64) + 0.5)
+    start, stop = _first_centre(left, screen.width), _first_centre(right, screen.width)
+    filled = torch.nonzero(stop > start).squeeze(1)
+    triangle, row, start, stop = (part.index_select(0, filled) for part in (triangle, row, start, stop))
+    first, step = _depths(x, y, depth, triangle, row, start, stop)
+    return Spans(chosen.index_select(0, triangle) + before, row, start, stop - start, first, step)
 
 
 def span_chunks(spans: Spans) -> Iterator[tuple[Tensor, Tensor]]:
@@ -76,47 +115,68 @@ def _first_centre(coordinate: Tensor, size: int) -> Tensor:
     return (coordinate - 0.5).ceil().clamp(0, size).to(torch.int64)
 
 
-def _least(corners: Tensor, axis: int) -> Tensor:
-    """Least coordinate of triangles (T, 3, 3): pairs at once are faster than a minimum over so few."""
-    a, b, c = corners[..., axis].unbind(1)
+def _least(a: Tensor, b: Tensor, c: Tensor) -> Tensor:
+    """Least of three: pairs at once are faster than a minimum over so few."""
     return torch.minimum(torch.minimum(a, b), c)
 
 
-def _most(corners: Tensor, axis: int) -> Tensor:
-    a, b, c = corners[..., axis].unbind(1)
+def _most(a: Tensor, b: Tensor, c: Tensor) -> Tensor:
+    """Largest of three."""
     return torch.maximum(torch.maximum(a, b), c)
 
 
-def _crossings(corners: Tensor, triangle: Tensor, centre: Tensor) -> tuple[Tensor, Tensor]:
-    """Where the horizontal line at ``centre`` enters and leaves each triangle; empty (inf, -inf) if it misses."""
-    first, second = corners, corners.roll(-1, 1)
-    swap = (second[..., 1] < first[..., 1])[..., None]
-    upper, lower = torch.where(swap, second, first), torch.where(swap, first, second)
-    rise = lower[..., 1] - upper[..., 1]
-    slope = (lower[..., 0] - upper[..., 0]) / torch.where(rise > 0, rise, 1)
-    left = torch.full_like(centre, torch.inf)
-    right = torch.full_like(centre, -torch.inf)
-    for edge in range(3):
-        top, bottom = upper[:, edge, 1][triangle], lower[:, edge, 1][triangle]
-        x = upper[:, edge, 0][triangle] + (centre - top) * slope[:, edge][triangle]
-        crossed = (top <= centre) & (centre < bottom)
-        left = torch.where(crossed, torch.minimum(left, x), left)
-        right = torch.where(crossed, torch.maximum(right, x), right)
-    return left, right
+def _crossings(x: list[Tensor], y: list[Tensor], triangle: Tensor, centre: Tensor) -> tuple[Tensor, Tensor]:
+    """Where the horizontal lines at ``centre`` (S,) enter and leave triangles, between their corners up and down.
+
+    Args:
+        x: (T,) of each of three corners.
+        y: (T,) of each of them.
+        triangle: (S,) that each line meets.
+        centre: (S,) from the top of that triangle on, above its bottom.
+    """
+    (x0, y0), (x1, y1), (x2, y2) = _downwards(x, y)
+    long, upper, lower = _slope(x0, y0, x2, y2), _slope(x0, y0, x1, y1), _slope(x1, y1, x2, y2)
+    x0, y0, x1, y1, long, upper, lower = (
+        part.index_select(0, triangle) for part in (x0, y0, x1, y1, long, upper, lower)
+    )
+    down = centre - y0
+    one = x0 + down * long
+    other = torch.where(centre < y1, x0 + down * upper, x1 + (centre - y1) * lower)
+    return torch.minimum(one, other), torch.maximum(one, other)
 
 
-def _depths(corners: Tensor, triangle: Tensor, row: Tensor, start: Tensor, stop: Tensor) -> tuple[Tensor, Tensor]:
+def _downwards(x: list[Tensor], y: list[Tensor]) -> list[tuple[Tensor, Tensor]]:
+    """Three points of every triangle, in the order of y."""
+    points = list(zip(x, y, strict=True))
+    for i, j in ((0, 1), (1, 2), (0, 1)):
+        (ax, ay), (bx, by) = points[i], points[j]
+        swap = by < ay
+        points[i] = torch.where(swap, bx, ax), torch.where(swap, by, ay)
+        points[j] = torch.where(swap, ax, bx), torch.where(swap, ay, by)
+    return points
+
+
+def _slope(x0: Tensor, y0: Tensor, x1: Tensor, y1: Tensor) -> Tensor:
+    """Step in x for one down along edges; of no use for level ones, which no line crosses."""
+    rise = y1 - y0
+    return (x1 - x0) / torch.where(rise > 0, rise, 1)
+
+
+def _depths(
+    x: list[Tensor], y: list[Tensor], z: list[Tensor], triangle: Tensor, row: Tensor, start: Tensor, stop: Tensor
+) -> tuple[Tensor, Tensor]:
     """Depth at the first pixel of each span and its step, never outside the depths of the triangle's corners."""
-    origin = corners[:, 0]
-    a, b = corners[:, 1] - origin, corners[:, 2] - origin
-    area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    safe = torch.where(area != 0, area, 1)
-    slope_x = torch.where(area != 0, a[:, 2] * b[:, 1] - a[:, 1] * b[:, 2], 0) / safe
-    slope_y = torch.where(area != 0, a[:, 0] * b[:, 2] - a[:, 2] * b[:, 0], 0) / safe
-    at_row = (origin[:, 2] + (0.5 - origin[:, 1]) * slope_y + (0.5 - origin[:, 0]) * slope_x)[triangle]
-    at_row = at_row + row * slope_y[triangle]
-    nearest, farthest = _least(corners, 2)[triangle], _most(corners, 2)[triangle]
-    across = slope_x[triangle]
+    (ax, ay, az), (bx, by, bz) = ((x[k] - x[0], y[k] - y[0], z[k] - z[0]) for k in (1, 2))
+    area = ax * by - ay * bx
+    known = area != 0
+    safe = torch.where(known, area, 1)
+    slope_x = torch.where(known, az * by - ay * bz, 0) / safe
+    slope_y = torch.where(known, ax * bz - az * bx, 0) / safe
+    at_top = z[0] + (0.5 - y[0]) * slope_y + (0.5 - x[0]) * slope_x
+    at_top, down, across, nearest, farthest = (
+        part.index_select(0, triangle) for part in (at_top, slope_y, slope_x, _least(*z), _most(*z))
+    )
+    at_row = at_top + row * down
     first = torch.clamp(at_row + start * across, nearest, farthest)
     last = torch.clamp(at_row + (stop - 1) * across, nearest, farthest)
     return first, (last - first) / (stop - start - 1).clamp(min=1)

@@ -12,11 +12,12 @@ from .._precision import in_single_at_least
 from ..cameras.camera import Camera, Size, check_camera, height_and_width
 from ..errors import ShapeError, TorchfairError
 from ..geometry import face_normals
-from ..geometry._ops import dot
+from ..geometry._ops import dot, gather
 from ..rasterisation.planes import SeenPlanes
 from ..rasterisation.rasterise import visible_triangles
 from ..topology import Topology
 from ..triangulation import triangulate
+from ._edge_boxes import BoxedPoints, DepthLimits, roundings
 
 _PORTION = 1 << 18  # points looked at together
 
@@ -59,26 +60,74 @@ def edge_visibility(
         raise TorchfairError("a vertex is not finite: visibility needs positions without NaN and infinity")
     if samples < 1:
         raise ShapeError("samples", "at least 1", samples)
-    pixels = height_and_width(size)
+    return visible_shares(mesh, topology, camera, height_and_width(size), samples).to(vertices)
+
+
+def visible_shares(
+    mesh: Tensor,
+    topology: Topology,
+    camera: Camera,
+    size: tuple[int, int],
+    samples: int = 8,
+    nearest: Tensor | None = None,
+) -> Tensor:
+    """The same, float64, of a finite ``mesh`` (V, 3) of float64.
+
+    With ``nearest`` (views, height, width) triangles need not be looked for again: numbers of those of
+    ``triangulate`` that are seen at the pixel centres, -1 for none.
+
+    In parallel views edges within a few pixels are settled first that all of the surface there is behind, or before:
+    nearly all edges of fine meshes. Only what is left is looked at point by point.
+    """
     triangles = triangulate(mesh, topology).triangles
-    ends = mesh[topology.interior_edges]
-    steps = (torch.arange(samples, device=mesh.device, dtype=mesh.dtype) + 0.5) / samples
-    normals = face_normals(mesh, topology)[topology.interior_edge_faces]
-    sides = dot(normals, camera.view_directions(ends.mean(1))[..., None, :]).sign()  # (views, I, 2)
-    same_side = sides.prod(-1) > 0
-    views = [
-        _View.of(points, triangles, visible_triangles(points, triangles, pixels[1], pixels[0]))
-        for points in camera.project(mesh, size)
-    ]
+    normals = face_normals(mesh, topology)
+    margins = None if camera.central else roundings(mesh, camera, size[1])
     shares = []
-    for some in torch.split(ends, max(1, _PORTION // samples)):
-        along = torch.lerp(some[:, :1], some[:, 1:], steps[:, None]).reshape(-1, 3)
-        seen = [
-            view.sees(places).view(-1, samples).to(mesh.dtype).mean(-1)
-            for places, view in zip(camera.project(along, size), views, strict=True)
-        ]
-        shares.append(torch.stack(seen))
-    return (same_side * torch.cat(shares, 1)).to(vertices)
+    for number in range(camera.num_views):
+        one = camera.select(slice(number, number + 1))
+        points = one.project(mesh, size)[0]
+        shown = visible_triangles(points, triangles, size[1], size[0]) if nearest is None else nearest[number]
+        view = _View.of(points, triangles, shown)
+        share = mesh.new_zeros(topology.num_interior_edges)
+        left = torch.nonzero(_same_side(mesh, topology, normals, one)).squeeze(1)
+        if margins is not None:
+            left = _settle(share, left, view, BoxedPoints.of(points, size, margins[number]), topology.interior_edges)
+        _look(share, left, view, mesh, topology.interior_edges, one, samples)
+        shares.append(share)
+    return torch.stack(shares) if shares else mesh.new_zeros(0, topology.num_interior_edges)
+
+
+def _same_side(mesh: Tensor, topology: Topology, normals: Tensor, view: Camera) -> Tensor:
+    """(I,) whether one view sees the same side of both faces of edges."""
+    if view.central:
+        directions = view.view_directions(mesh[topology.interior_edges].mean(1))[0]
+        return dot(normals[topology.interior_edge_faces], directions[:, None]).sign().prod(-1) > 0
+    signs = dot(normals, view.middle_directions.to(mesh)).sign().to(torch.int8)
+    left, right = (signs.index_select(0, faces) for faces in topology.interior_edge_faces.unbind(1))
+    return left * right > 0
+
+
+def _settle(share: Tensor, chosen: Tensor, view: _View, ends: BoxedPoints, edges: Tensor) -> Tensor:
+    """Writes the shares of those of the chosen edges that are all seen or all hidden; the others."""
+    limits = view.limits()
+    left = []
+    for some in torch.split(chosen, _PORTION):
+        seen, told = limits.told(ends, edges.index_select(0, some))
+        share[some[seen]] = 1.0
+        left.append(some[~told])
+    return torch.cat(left)
+
+
+def _look(
+    share: Tensor, chosen: Tensor, view: _View, mesh: Tensor, edges: Tensor, camera: Camera, samples: int
+) -> None:
+    """Writes the shares of the chosen edges, from so many points of each."""
+    steps = (torch.arange(samples, device=mesh.device, dtype=mesh.dtype) + 0.5) / samples
+    for some in torch.split(chosen, max(1, _PORTION // samples)):
+        ends = gather(mesh, edges.index_select(0, some))
+        along = torch.lerp(ends[:, :1], ends[:, 1:], steps[:, None]).reshape(-1, 3)
+        places = camera.project(along, view.shape)[0]
+        share[some] = view.sees(places).view(-1, samples).to(mesh.dtype).mean(-1)
 
 
 def _extent(points: Tensor) -> Tensor | float:
@@ -103,6 +152,19 @@ class _View(NamedTuple):
     def of(cls, points: Tensor, triangles: Tensor, nearest: Tensor) -> _View:
         """With projected points (V, 3) and the nearest triangle (H, W) at every pixel."""
         return cls(SeenPlanes.of(points, triangles, nearest), _SLACK[1] * _extent(points))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the picture."""
+        height, width = self.seen.number.shape
+        return height, width
+
+    def limits(self) -> DepthLimits:
+        """Depths that decide for whole squares of pixels."""
+        planes = self.seen.planes
+        ends = (depths + _SLACK[0] * planes.slopes() + self.slack for depths in (planes.nearest(), planes.farthest()))
+        everywhere = planes.rows.new_tensor([torch.inf])  # -1, where nothing is, picks the last
+        return DepthLimits.of(*(torch.cat([end, everywhere])[self.seen.number] for end in ends))
 
     def sees(self, places: Tensor) -> Tensor:
         """Whether projected places (N, 3) lie on or before the surface at their pixel, inside the picture: (N,)."""

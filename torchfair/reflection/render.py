@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import torch
@@ -100,14 +101,17 @@ def render_reflection(
         TypeError: if ``camera`` is no :class:`~torchfair.cameras.Camera`.
     """
     refuse_recording("render_reflection")
-    draw = _checked
+    draw = render_shadings
     if torch.compiler.is_compiling():  # left to eager mode: sizes depend on what is seen
-        draw = torch.compiler.disable(_checked)  # type: ignore[no-untyped-call]
-    return draw(vertices, topology, camera, environment, size, supersampling, antialias, shading, normals, background)
+        draw = torch.compiler.disable(render_shadings)  # type: ignore[no-untyped-call]
+    pictures, _ = draw(
+        vertices, topology, camera, environment, size, supersampling, antialias, (shading,), normals, background
+    )
+    return pictures[0]
 
 
 @in_single_at_least
-def _checked(
+def render_shadings(
     vertices: Tensor,
     topology: Topology,
     camera: Camera,
@@ -115,48 +119,78 @@ def _checked(
     size: Size,
     supersampling: int,
     antialias: bool,
-    shading: Shading,
-    normals: Tensor | None,
-    background: Tensor | float,
-) -> Reflection:
+    shadings: Sequence[Shading],
+    normals: Tensor | None = None,
+    background: Tensor | float = 0.0,
+) -> tuple[list[Reflection], Tensor]:
+    """What :func:`render_reflection` gives in several shadings, for which faces are looked for once.
+
+    Also the triangles (*batch, views, supersampling H, supersampling W) int64 that are seen, -1 for none: numbers of
+    those of ``triangulate``, where nothing is cut away, as in all parallel views.
+    """
     check_camera(camera)
     topology.check_vertices(vertices)
     height, width = height_and_width(size)
     if not bool(torch.isfinite(vertices).all()):
         raise TorchfairError("a vertex is not finite: pictures need positions without NaN and infinity")
-    if shading not in ("flat", "smooth"):
-        raise TorchfairError(f'shading must be "flat" or "smooth", got {shading!r}')
+    for shading in shadings:
+        if shading not in ("flat", "smooth"):
+            raise TorchfairError(f'shading must be "flat" or "smooth", got {shading!r}')
     if supersampling < 1:
         raise TorchfairError(f"supersampling must be at least 1, got {supersampling}")
-    if normals is None:
-        normals = (vertex_normals if shading == "smooth" else face_normals)(vertices, topology)
-    else:
-        _check_normals(normals, vertices, topology, shading)
+    surfaces = [_Surface.of(vertices, topology, shading, normals) for shading in shadings]
     around = Surroundings(camera, (height * supersampling, width * supersampling), environment, background)
-    colors, faces = _pictures(
-        vertices, topology, normals, around, supersampling, smooth=shading == "smooth", antialias=antialias
-    )
-    colors = colors.view(*colors.shape[:-2], height, width, colors.shape[-1]).movedim(-1, -3)
-    return Reflection(colors[..., :-1, :, :].contiguous(), colors[..., -1, :, :].contiguous(), faces)
+    *pictures, faces, triangles = _pictures(vertices, topology, surfaces, around, supersampling, antialias)
+    reflections = []
+    for colors in pictures:
+        image = colors.view(*colors.shape[:-2], height, width, colors.shape[-1]).movedim(-1, -3)
+        reflections.append(Reflection(image[..., :-1, :, :].contiguous(), image[..., -1, :, :].contiguous(), faces))
+    return reflections, triangles
+
+
+class _Surface(NamedTuple):
+    """What mirrors: unit normals (*batch, F or V, 3), and whether they are blended over each face."""
+
+    normals: Tensor
+    smooth: bool
+
+    @classmethod
+    def of(cls, vertices: Tensor, topology: Topology, shading: Shading, normals: Tensor | None) -> _Surface:
+        """With the normals that are given, or those of the mesh."""
+        if normals is None:
+            normals = (vertex_normals if shading == "smooth" else face_normals)(vertices, topology)
+        else:
+            _check_normals(normals, vertices, topology, shading)
+        return cls(normals, shading == "smooth")
+
+    def part(self, chosen: slice) -> _Surface:
+        """Of some meshes of a batch (meshes, ...)."""
+        return self._replace(normals=self.normals[chosen])
 
 
 def _pictures(
-    vertices: Tensor, topology: Topology, normals: Tensor, around: Surroundings, factor: int, **how: bool
-) -> tuple[Tensor, Tensor]:
-    """All pictures, some at a time: (*batch, views, H W, channels + 1), and face numbers of the samples."""
+    vertices: Tensor,
+    topology: Topology,
+    surfaces: Sequence[_Surface],
+    around: Surroundings,
+    factor: int,
+    antialias: bool,
+) -> list[Tensor]:
+    """All pictures, some at a time: (*batch, views, H W, channels + 1) of each surface; faces, triangles of samples."""
     batch, views = vertices.shape[:-2], around.camera.num_views
     if not math.prod(batch):  # one mesh tells the shapes
-        one = _pictures(
-            vertices.new_zeros(vertices.shape[-2:]),
-            topology,
-            normals.new_zeros(normals.shape[-2:]),
-            around,
-            factor,
-            **how,
+        one = [surface._replace(normals=surface.normals.new_zeros(surface.normals.shape[-2:])) for surface in surfaces]
+        *pictures, faces, triangles = _pictures(
+            vertices.new_zeros(vertices.shape[-2:]), topology, one, around, factor, antialias
         )
-        colors, faces = (part.expand(*batch, *part.shape) for part in one)
-        return colors + vertices.sum((-2, -1))[..., None, None, None], faces
-    meshes, normals = (part.reshape(math.prod(batch), *part.shape[-2:]) for part in (vertices, normals))
+        nothing = vertices.sum((-2, -1))[..., None, None, None]
+        pictures = [part.expand(*batch, *part.shape) + nothing for part in pictures]
+        return [*pictures, *(part.expand(*batch, *part.shape) for part in (faces, triangles))]
+    meshes = vertices.reshape(math.prod(batch), *vertices.shape[-2:])
+    surfaces = [
+        surface._replace(normals=surface.normals.reshape(len(meshes), *surface.normals.shape[-2:]))
+        for surface in surfaces
+    ]
     mesh_step, view_step = _steps(topology.num_faces, views, height_and_width(around.size))
     rows = []
     for first in range(0, max(meshes.shape[0], 1), mesh_step):
@@ -164,41 +198,44 @@ def _pictures(
         row = []
         for view in range(0, views, view_step):
             some = dataclasses.replace(around, camera=around.camera.select(slice(view, view + view_step)))
-            row.append(_render(meshes[chosen], topology, normals[chosen], some, factor, **how))
+            own = [surface.part(chosen) for surface in surfaces]
+            row.append(_render(meshes[chosen], topology, own, some, factor, antialias))
         rows.append([torch.cat(parts, dim=1) for parts in zip(*row, strict=True)])
-    colors, faces = (torch.cat(parts) for parts in zip(*rows, strict=True))
-    return colors.view(*batch, *colors.shape[1:]), faces.view(*batch, *faces.shape[1:])
+    columns = [torch.cat(parts) for parts in zip(*rows, strict=True)]
+    return [column.view(*batch, *column.shape[1:]) for column in columns]
 
 
 def _render(
     meshes: Tensor,
     topology: Topology,
-    normals: Tensor,
+    surfaces: Sequence[_Surface],
     around: Surroundings,
     factor: int,
-    *,
-    smooth: bool,
     antialias: bool,
-) -> tuple[Tensor, Tensor]:
-    """Colours and coverage (meshes, views, H W, channels + 1), and face numbers of the samples."""
+) -> list[Tensor]:
+    """Colours and coverage (meshes, views, H W, channels + 1) of each surface; faces and triangles of the samples."""
     camera, (height, width) = around.camera, height_and_width(around.size)
     scene = build_scene(meshes, topology, camera, around.size)
-    shade: Shader
-    if smooth or camera.central:
-        shade = PlaceShader(scene, normals, around, smooth=smooth)
-    else:
-        shade = ConstantShader(scene, normals, around)
     seen = visible_triangles(
         scene.points, scene.triangles, width, height, pictures=scene.pictures, num_pictures=scene.num_pictures
     )
-    colors = mean_colors(shade, seen, factor)
-    if antialias or _differentiated(colors, scene.points):
-        pixels, terms = edge_terms(scene, shade, (height, width), smooth=smooth, antialias=antialias)
-        pixels = coarse_pixels(pixels, width, factor)
-        colors = colors.index_add(0, pixels, terms / factor**2)
-    faces = torch.cat([scene.faces, scene.faces.new_tensor([-1])])[seen]  # -1 picks the last
     lead = (scene.num_meshes, scene.num_views)
-    return colors.view(*lead, -1, colors.shape[-1]), faces.view(*lead, height, width)
+    pictures = []
+    for normals, smooth in surfaces:
+        shade: Shader
+        if smooth or camera.central:
+            shade = PlaceShader(scene, normals, around, smooth=smooth)
+        else:
+            shade = ConstantShader(scene, normals, around)
+        colors = mean_colors(shade, seen, factor)
+        if antialias or _differentiated(colors, scene.points):
+            pixels, terms = edge_terms(scene, shade, (height, width), smooth=smooth, antialias=antialias)
+            pixels = coarse_pixels(pixels, width, factor)
+            colors = colors.index_add(0, pixels, terms / factor**2)
+        pictures.append(colors.view(*lead, -1, colors.shape[-1]))
+    faces = torch.cat([scene.faces, scene.faces.new_tensor([-1])])[seen]  # -1 picks the last
+    own = torch.where(seen < 0, -1, seen % max(1, scene.triangles.shape[0] // max(1, scene.num_pictures)))
+    return [*pictures, faces.view(*lead, height, width), own.view(*lead, height, width)]
 
 
 def _differentiated(*tensors: Tensor) -> bool:

@@ -16,7 +16,7 @@ from ..errors import TorchfairError
 from ..topology import Topology
 from .default_views import default_camera, default_stripe_directions
 from .environments import Stripes
-from .render import render_reflection
+from .render import Shading, render_reflection, render_shadings
 from .smooth_reference import Reference, SmoothReference, smooth_reference
 
 STRIPES = 4.0
@@ -117,6 +117,19 @@ class ReflectionSetup:
     def smooth(self, vertices: Tensor, topology: Topology, normals: Tensor | None = None) -> Pictures:
         """Pictures of ``vertices`` (*batch, V, 3) that mirror with ``normals`` (*batch, V, 3), their own by default."""
         return self._render(vertices, topology, shading="smooth", normals=normals)
+
+    def compared(self, vertices: Tensor, topology: Topology) -> tuple[Pictures, Pictures, Tensor]:
+        """Pictures of plane mirrors, what they are compared with, and triangles that are seen, of a mesh (V, 3).
+
+        The same as :meth:`flat` and :meth:`pictures_to_match`, where both pictures are of the same mesh in half the
+        time. For the triangles see :func:`torchfair.reflection.render.render_shadings`.
+        """
+        shadings: tuple[Shading, ...] = ("flat",) if self.reference is not None else ("flat", "smooth")
+        pictures, triangles = render_shadings(
+            vertices, topology, self.camera, self._surroundings, self.size, self.supersampling, False, shadings
+        )
+        flat, *own = (_split(picture.image, picture.coverage) for picture in pictures)
+        return flat, own[0] if own else self.pictures_to_match(vertices, topology), triangles
 
     def _render(self, vertices: Tensor, topology: Topology, **shading: Any) -> Pictures:
         picture = render_reflection(
