@@ -10,6 +10,7 @@ from torch import Tensor
 
 from torchfair import ShapeError, Topology
 from torchfair.geometry import balanced_normals, corrected_shape_operators, face_normals
+from torchfair.geometry.corrected_shape_operator import _of_faces, _of_polygons
 from torchfair.shapes import Cylinder, Sphere, Torus, irregular_triangles, parameter_quads, parameter_triangles
 
 
@@ -125,3 +126,12 @@ def test_one_set_of_normals_serves_a_batch():
     batch = torch.stack([mesh.vertices, 2 * mesh.vertices])
     stars = corrected_shape_operators(batch, mesh.topology, mesh.normals)
     torch.testing.assert_close(stars[1], 2 * stars[0])
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+def test_faces_with_equally_many_corners_are_summed_like_any_polygons(triangles: bool) -> None:
+    vertices, topology = wavy_grid(6, 5, triangles=triangles)
+    vertices = vertices.to(DOUBLE)
+    normals = balanced_normals(vertices, topology)
+    found = _of_faces(vertices, normals, topology.corners.view(topology.num_faces, -1))
+    assert torch.equal(found, _of_polygons(vertices, normals, topology))

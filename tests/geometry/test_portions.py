@@ -7,7 +7,13 @@ import torch
 from helpers import DOUBLE, wavy_grid
 
 from torchfair import Topology, _portions
-from torchfair.geometry import face_area_vectors, face_normals, planarity
+from torchfair.geometry import (
+    balanced_normals,
+    corrected_shape_operators,
+    face_area_vectors,
+    face_normals,
+    planarity,
+)
 from torchfair.geometry._ops import map_faces
 
 
@@ -18,7 +24,9 @@ def mixed() -> tuple[torch.Tensor, Topology]:
     return vertices, Topology.from_faces(faces)
 
 
-@pytest.mark.parametrize("function", [face_area_vectors, face_normals, planarity])
+@pytest.mark.parametrize(
+    "function", [face_area_vectors, face_normals, planarity, balanced_normals, corrected_shape_operators]
+)
 @pytest.mark.parametrize("mesh", [mixed, lambda: wavy_grid(9, 8, triangles=True)])
 def test_portions_change_no_bit(function, mesh, monkeypatch):
     vertices, topology = mesh()

@@ -8,7 +8,15 @@ from helpers import cube, wavy_grid
 
 from torchfair import ShapeError, Topology
 from torchfair.geometry import dihedral_angles, face_areas, planarity
-from torchfair.measuring import count_meetings, edge_measures, panel_measures, verdict, worst_edges, worst_panels
+from torchfair.measuring import (
+    count_meetings,
+    edge_measures,
+    element_measures,
+    panel_measures,
+    verdict,
+    worst_edges,
+    worst_panels,
+)
 from torchfair.measuring.measurements import measure_mesh
 
 
@@ -84,3 +92,26 @@ def test_faces_side_by_side_do_not_run_through_each_other() -> None:
     crossed = torch.cat([soup[:3], soup[:3] @ torch.tensor([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]], dtype=torch.float64)])
     crossed[3:] += torch.tensor([0.3, 0.2, -0.3], dtype=torch.float64)
     assert count_meetings(crossed, topology) == 1
+
+
+def test_the_largest_of_many_are_those_of_a_stable_sort() -> None:
+    torch.manual_seed(0)
+    for values in (
+        torch.randint(0, 4, (50,)).double(),
+        torch.rand(50, dtype=torch.float64),
+        torch.zeros(50),
+        torch.where(torch.rand(50) < 0.1, math.nan, torch.randint(0, 4, (50,)).double()),
+        torch.full((50,), math.nan),
+        torch.zeros(0),
+    ):
+        for count in (0, 1, 3, 49, 50, 70):
+            expected = values.argsort(descending=True, stable=True)[:count]
+            assert torch.equal(element_measures._largest(values, count), expected)
+
+
+def test_panels_that_are_chosen_are_those_of_the_list_of_all() -> None:
+    vertices, topology = wavy_grid(5, 6)
+    every = panel_measures(vertices, topology)
+    chosen = [7, 2, 2, len(every) - 1]
+    assert panel_measures(vertices, topology, torch.tensor(chosen)) == [every[face] for face in chosen]
+    assert panel_measures(vertices, topology, torch.zeros(0, dtype=torch.int64)) == []

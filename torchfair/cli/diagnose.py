@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._remembered import remembering
 from ..progress import phase
 from .arguments import count
 from .chosen_vertices import NUMBERS, ChosenVertices
@@ -83,11 +84,12 @@ def run(arguments: argparse.Namespace) -> int:
     mesh = read_input(arguments.input, arguments)
     chosen = ChosenVertices(mesh)
     drawn = _drawn(arguments, chosen)
-    with phase("judging stars"):
-        diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
-    numbers, worst = diagnosis.counts(), diagnosis.worst_vertices(arguments.worst)
-    with phase("comparing edges with principal directions"):
-        advice = layout_advice(mesh.vertices, mesh.topology, diagnosis, names=mesh.names)
+    with remembering():
+        with phase("judging stars"):
+            diagnosis = diagnose_mesh(mesh.vertices, mesh.topology)
+        numbers, worst = diagnosis.counts(), diagnosis.worst_vertices(arguments.worst)
+        with phase("comparing edges with principal directions"):
+            advice = layout_advice(mesh.vertices, mesh.topology, diagnosis, names=mesh.names)
     with phase("trying what mends the worst stars"):
         _explain(worst, mesh)
     report = {

@@ -6,12 +6,14 @@ from torch import Tensor
 
 from .._loading import safe_to_load
 from .._precision import in_single_at_least
+from .._remembered import remembered
 from ..geometry import dihedral_angles, edge_lengths
 from ..geometry._unit import in_their_units
 from ..topology import Topology
 from .base import EdgeEnergy, weigh
 
 
+@remembered
 @in_single_at_least
 def lengths_times_angles(vertices: Tensor, topology: Topology) -> Tensor:
     """Length times signed dihedral angle (*batch, I) of every interior edge, for meshes of any size."""

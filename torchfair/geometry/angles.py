@@ -8,12 +8,14 @@ import torch
 from torch import Tensor
 
 from .._precision import in_single_at_least
+from .._remembered import remembered
 from ..topology import Topology
 from ._any_size import of_any_size
 from ._ops import angle_of, cross, dot, gather, norm, scatter_sum
 from .areas import face_area_vectors
 
 
+@remembered
 @of_any_size(0)
 def corner_angles(vertices: Tensor, topology: Topology) -> Tensor:
     """Interior angle of the face at every corner, in radians.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from torch import Tensor
 
 from .._precision import in_single_at_least
+from .._remembered import remembered
 from ..topology import Topology
 from ._any_size import of_any_size
 from ._ops import cross, map_faces, norm
@@ -46,6 +47,7 @@ def face_area_vectors(vertices: Tensor, topology: Topology) -> Tensor:
     return map_faces(vertices, topology, area_vector)
 
 
+@remembered
 @of_any_size(2)
 def face_areas(vertices: Tensor, topology: Topology) -> Tensor:
     """Area of every face: the length of its area vector.

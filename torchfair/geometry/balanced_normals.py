@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from .._portions import portions_unless
 from ..topology import Topology
 from ._any_size import of_any_size
 from ._ops import dot, gather, norm, scatter_sum
@@ -80,21 +81,32 @@ class _Edges:
 
 def _sweep(normals: Tensor, star: _Edges, step: Tensor | float) -> Tensor:
     """Normals moved by ``step`` times the way to the best fit, the neighbours taken as they are."""
-    size, count = normals.shape[-2], star.directions.shape[-2]
     bases = tangent_bases(normals)
-    at_ends = gather(normals, star.ends)
-    first, second = at_ends[..., :count, :], at_ends[..., count:, :]
-    known = (first != 0).any(-1) & (second != 0).any(-1)
-    directions = torch.where(known[..., None], star.directions, 0.0)
-    slope = dot(first + second, directions)
-    # The direction of an edge in the tangent planes of both its ends, (*batch, 2E, 2).
-    along = torch.cat([directions, directions], dim=-2)[..., None, :]
-    x, y = dot(bases.index_select(-3, star.ends), along).unbind(-1)
-    both = torch.cat([slope, slope], dim=-1)
-    sums = scatter_sum(torch.stack([x * x, x * y, y * y, x * both, y * both], dim=-1), star.ends, size)
-    xx, xy, yy, xs, ys = sums.unbind(-1)
+    ends = star.ends.view(2, -1)
+    recorded = normals.requires_grad or star.directions.requires_grad
+    parts = [
+        _moments(normals, bases, star.directions[..., part, :], ends[:, part])
+        for part in portions_unless(recorded, ends.shape[1], normals)
+    ]
+    moments = torch.cat([moments for side in zip(*parts, strict=True) for moments in side], dim=-2)
+    xx, xy, yy, xs, ys = scatter_sum(moments, star.ends, normals.shape[-2]).unbind(-1)
     xx, yy = xx + _STIFFNESS, yy + _STIFFNESS
     turn = torch.stack([xy * ys - yy * xs, xy * xs - xx * ys], dim=-1) / (xx * yy - xy * xy)[..., None]
     moved = normals + step * (turn[..., None] * bases).sum(-2)
     length = norm(moved)  # at least 1: the turn is orthogonal to the normal
     return moved / torch.where(length > 0, length, 1.0)[..., None]
+
+
+def _moments(normals: Tensor, bases: Tensor, directions: Tensor, ends: Tensor) -> tuple[Tensor, Tensor]:
+    """What edges (*batch, n, 3) add to the fits at both their ends (2, n): (*batch, n, 5) each."""
+    first, second = (gather(normals, end) for end in ends)
+    known = (first != 0).any(-1) & (second != 0).any(-1)
+    directions = torch.where(known[..., None], directions, 0.0)
+    slope = dot(first + second, directions)
+
+    def at(end: Tensor) -> Tensor:
+        # The direction of an edge in the tangent plane of its end.
+        x, y = dot(bases.index_select(-3, end), directions[..., None, :]).unbind(-1)
+        return torch.stack([x * x, x * y, y * y, x * slope, y * slope], dim=-1)
+
+    return at(ends[0]), at(ends[1])

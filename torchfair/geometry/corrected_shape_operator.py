@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import functools
+
 import torch
 from torch import Tensor
 
+from .._portions import portions_unless
 from ..errors import ShapeError
 from ..topology import Topology
 from ._any_size import of_any_size
-from ._ops import cross, gather, scatter_sum
+from ._ops import cross, face_groups, gather, scatter_sum
 from .balanced_normals import balanced_normals
 
 
@@ -62,6 +65,29 @@ def corrected_shape_operators(vertices: Tensor, topology: Topology, normals: Ten
     elif normals.shape[-2:] != vertices.shape[-2:] or not normals.is_floating_point():
         expected = "a floating tensor (*batch, V, 3), one unit normal per vertex"
         raise ShapeError("normals", expected, f"{tuple(normals.shape)} {normals.dtype}")
+    (_, corners), *others = face_groups(topology)
+    if others:
+        per_face = _of_polygons(vertices, normals, topology)
+    else:
+        portions = portions_unless(vertices.requires_grad or normals.requires_grad, len(corners), vertices)
+        per_face = torch.cat([_of_faces(vertices, normals, corners[part]) for part in portions], dim=-2)
+    stars = scatter_sum(gather(per_face, topology.corner_faces), topology.corners, topology.num_vertices)
+    return stars.reshape((*stars.shape[:-1], 3, 3))
+
+
+def _of_faces(vertices: Tensor, normals: Tensor, corners: Tensor) -> Tensor:
+    """The share (*batch, n, 9) of every corner of faces (n, k) with equally many corners."""
+    points, at_corners = gather(vertices, corners), gather(normals, corners)
+    chord = points.roll(-1, -2) - points.roll(1, -2)
+    size = corners.shape[1]
+    mean = functools.reduce(torch.add, at_corners.unbind(-2)) / size
+    axis = cross(mean[..., None, :].expand_as(at_corners), at_corners)
+    per_corner = (axis[..., :, None] * chord[..., None, :]).flatten(-2) / 2
+    return functools.reduce(torch.add, per_corner.unbind(-2)) / size
+
+
+def _of_polygons(vertices: Tensor, normals: Tensor, topology: Topology) -> Tensor:
+    """The same (*batch, F, 9) of any faces."""
     points, corner_normals = gather(vertices, topology.corners), gather(normals, topology.corners)
     ahead = gather(points, topology.next_corners)
     # Of the corner after the next, seen from the next one: x_{i+1} - x_{i-1}.
@@ -72,6 +98,4 @@ def corrected_shape_operators(vertices: Tensor, topology: Topology, normals: Ten
     mean = scatter_sum(corner_normals, topology.corner_faces, topology.num_faces) / sizes
     axis = cross(gather(mean, topology.corner_faces), corner_normals)
     per_corner = (axis[..., :, None] * chord[..., None, :]).flatten(-2) / 2
-    per_face = scatter_sum(per_corner, topology.corner_faces, topology.num_faces) / sizes
-    stars = scatter_sum(gather(per_face, topology.corner_faces), topology.corners, topology.num_vertices)
-    return stars.reshape((*stars.shape[:-1], 3, 3))
+    return scatter_sum(per_corner, topology.corner_faces, topology.num_faces) / sizes

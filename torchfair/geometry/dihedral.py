@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._remembered import remembered
 from ..topology import Topology
 from ._any_size import of_any_size
 from ._ops import cross, dot, norm
@@ -12,6 +13,7 @@ from .lengths import edge_vectors
 from .normals import adjacent_normals
 
 
+@remembered
 @of_any_size(0)
 def dihedral_angles(vertices: Tensor, topology: Topology) -> Tensor:
     r"""Signed angle between the normals of the two faces of every interior edge, in radians.

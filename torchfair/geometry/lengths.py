@@ -5,6 +5,7 @@ from __future__ import annotations
 from torch import Tensor
 
 from .._precision import in_single_at_least
+from .._remembered import remembered
 from ..topology import Topology
 from ._any_size import of_any_size
 from ._ops import norm
@@ -44,6 +45,7 @@ def edge_vectors(vertices: Tensor, topology: Topology) -> Tensor:
     return vertices.index_select(-2, w) - vertices.index_select(-2, v)
 
 
+@remembered
 @of_any_size(1)
 def edge_lengths(vertices: Tensor, topology: Topology) -> Tensor:
     """Length of every edge, boundary edges included.

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from .._precision import in_single_at_least
+from .._remembered import remembered
 from ..topology import Topology
 from ._any_size import of_any_size
 from ._ops import dot, gather, map_faces, norm, scatter_sum
@@ -16,6 +17,7 @@ DEGENERACY = 4.0
 """A face is degenerate if ``|A_f| <= DEGENERACY * eps * (sum of its squared edge lengths)``."""
 
 
+@remembered
 @of_any_size(0)
 def face_normals(vertices: Tensor, topology: Topology) -> Tensor:
     r"""Unit normal of every face: its area vector divided by its area.

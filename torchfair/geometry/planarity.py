@@ -6,11 +6,13 @@ import torch
 from torch import Tensor
 
 from .._precision import in_single_at_least
+from .._remembered import remembered
 from ..topology import Topology
 from ._ops import cross, dot, map_faces, norm
 from .normals import DEGENERACY
 
 
+@remembered
 @in_single_at_least
 def planarity(vertices: Tensor, topology: Topology) -> Tensor:
     r"""Relative deviation of every face from planarity: diagonal distance divided by the mean edge of the face.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor
 
 from ..topology import Topology
@@ -64,5 +63,5 @@ def shape_operators(vertices: Tensor, topology: Topology, *, sine: bool = True) 
         axis = unit(edges) * dihedral_angles(vertices, topology)[..., None]
     per_edge = (axis[..., :, None] * edges[..., None, :]).flatten(-2) / 2
     v, w = topology.interior_edges.unbind(1)
-    stars = scatter_sum(torch.cat([per_edge, per_edge], dim=-2), torch.cat([v, w]), topology.num_vertices)
+    stars = scatter_sum(per_edge, v, topology.num_vertices).index_add(-2, w, per_edge)
     return stars.reshape((*vertices.shape[:-1], 3, 3))

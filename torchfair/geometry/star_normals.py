@@ -6,11 +6,13 @@ import torch
 from torch import Tensor
 
 from .._precision import in_single_at_least
+from .._remembered import remembered
 from ..topology import Topology
 from ._ops import gather, scatter_sum
 from .normals import face_normals, normalise
 
 
+@remembered
 @in_single_at_least
 def star_normals(vertices: Tensor, topology: Topology) -> Tensor:
     """Unit vector along the plain sum of the face normals around every vertex (paper section 5.3, item 6).

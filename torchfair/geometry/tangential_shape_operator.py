@@ -6,6 +6,7 @@ from typing import Literal, get_args
 
 from torch import Tensor
 
+from .._remembered import remembered
 from ..errors import TorchfairError
 from ..topology import Topology
 from ._any_size import of_any_size
@@ -17,6 +18,7 @@ from .tangent_basis import tangent_bases
 Estimator = Literal["normal_cycle", "corrected"]
 
 
+@remembered
 @of_any_size(1)
 def tangential_shape_operators(
     vertices: Tensor, topology: Topology, *, estimator: Estimator = "normal_cycle", sine: bool = True

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from .._remembered import remembered
 from ..topology import Topology
 from ._any_size import of_any_size
 from ._ops import gather, scatter_sum
 from .areas import face_areas
 
 
+@remembered
 @of_any_size(2)
 def vertex_areas(vertices: Tensor, topology: Topology) -> Tensor:
     """Area of every vertex: equal shares of the faces around it, one third of every triangle.

@@ -173,7 +173,8 @@ def read_bytes(path: Path) -> bytes:
             raise MeshFileError(path, "is a folder, not a file")
         if path.exists() and not path.is_file():
             raise MeshFileError(path, "is not a regular file")  # reading a pipe or device may never end
-        data = path.read_bytes()
+        with path.open("rb", buffering=0) as file:  # without a copy
+            data = file.readall()
     except FileNotFoundError:
         raise MeshFileError(path, "does not exist") from None
     except OSError as error:
@@ -182,6 +183,6 @@ def read_bytes(path: Path) -> bytes:
         raise
     except ValueError as error:  # a NUL character in the path
         raise MeshFileError(path, f"is no usable file name ({error})") from None
-    if not data.strip():
+    if not data or data.isspace():
         raise MeshFileError(path, "is empty", 1)
     return data

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -10,6 +11,8 @@ from torch import Tensor
 
 from .. import geometry
 from .._one_mesh import one_mesh
+from .._ranges import ranges
+from .._remembered import remembering
 from ..energies import angle_variation_per_edge
 from ..errors import ShapeError
 from ..settings.fair_settings import FairSettings
@@ -86,6 +89,8 @@ def panel_measures(vertices: Tensor, topology: Topology, faces: Tensor | None = 
     """
     vertices = one_mesh(vertices, topology)
     chosen = torch.arange(topology.num_faces) if faces is None else faces.cpu()
+    if not len(chosen):
+        return []
     kinks = _largest_kinks(vertices, topology)
     warps = geometry.planarity(vertices, topology)
     longest = vertices.new_zeros(topology.num_faces).scatter_reduce(
@@ -95,10 +100,13 @@ def panel_measures(vertices: Tensor, topology: Topology, faces: Tensor | None = 
     numbers = torch.stack(columns, dim=1).cpu()[chosen].tolist()
     centres = geometry.face_centres(vertices, topology).cpu()[chosen].tolist()
     degenerate = geometry.degenerate_faces(vertices, topology).cpu()[chosen].tolist()
-    offsets, corners = topology.face_offsets.tolist(), topology.corners.tolist()
+    starts, sizes = (part.cpu()[chosen].numpy() for part in (topology.face_offsets[:-1], topology.face_sizes))
+    corners = iter(topology.corners.cpu().numpy()[ranges(starts, sizes)].tolist())
+    rings = [tuple(itertools.islice(corners, size)) for size in sizes.tolist()]
     rows = []
-    for face, place, (area, warp, edge, kink), flat in zip(chosen.tolist(), centres, numbers, degenerate, strict=True):
-        ring = tuple(corners[offsets[face] : offsets[face + 1]])
+    for face, ring, place, (area, warp, edge, kink), flat in zip(
+        chosen.tolist(), rings, centres, numbers, degenerate, strict=True
+    ):
         kind = "no area" if flat else _panel_kind(len(ring), warp)
         angle = None if kink < 0 else math.degrees(kink)
         rows.append(PanelMeasures(face, ring, (place[0], place[1], place[2]), area, warp, edge, angle, kind))
@@ -146,7 +154,8 @@ def worst_edges(vertices: Tensor, topology: Topology, count: int) -> list[EdgeMe
         ShapeError: if ``vertices`` are not one mesh that fits the topology, or ``count`` is negative.
     """
     vertices = one_mesh(vertices, topology)
-    return edge_measures(vertices, topology, _largest(angle_variation_per_edge(vertices, topology), count))
+    with remembering():
+        return edge_measures(vertices, topology, _largest(angle_variation_per_edge(vertices, topology), count))
 
 
 def worst_panels(vertices: Tensor, topology: Topology, count: int) -> list[PanelMeasures]:
@@ -161,15 +170,20 @@ def worst_panels(vertices: Tensor, topology: Topology, count: int) -> list[Panel
         ShapeError: if ``vertices`` are not one mesh that fits the topology, or ``count`` is negative.
     """
     vertices = one_mesh(vertices, topology)
-    warps = geometry.planarity(vertices, topology)
-    order = _largest(warps, count)
-    return panel_measures(vertices, topology, order[warps[order] >= PLANAR])
+    with remembering():
+        warps = geometry.planarity(vertices, topology)
+        order = _largest(warps, count)
+        return panel_measures(vertices, topology, order[warps[order] >= PLANAR])
 
 
 def _largest(values: Tensor, count: int) -> Tensor:
     """Numbers of the ``count`` largest values, the largest first, equal ones by their numbers."""
     if count < 0:
         raise ShapeError("count", "0 or more", count)
+    if 0 < count < len(values):  # sorted are only those among which the largest are
+        least = values.topk(count).values[-1]
+        some = torch.nonzero(~(values < least)).squeeze(1)  # NaN counts as large
+        return some[values[some].argsort(descending=True, stable=True)[:count]]
     return values.argsort(descending=True, stable=True)[:count]
 
 

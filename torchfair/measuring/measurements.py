@@ -13,6 +13,7 @@ from torch import Tensor
 from .. import energies, geometry
 from .._graph import count_components
 from .._one_mesh import one_mesh
+from .._remembered import remembering
 from ..topology import Topology
 
 Unit = Literal["length", "area", "1 / length", "degrees", "dimensionless"]
@@ -69,7 +70,8 @@ def measure_mesh(vertices: Tensor, topology: Topology) -> list[Quantity]:
         ShapeError: if ``vertices`` are not one mesh that fits the topology.
     """
     vertices = one_mesh(vertices, topology)
-    return [*_counts(vertices, topology), *_energies(vertices, topology), *_shape(vertices, topology)]
+    with remembering():
+        return [*_counts(vertices, topology), *_energies(vertices, topology), *_shape(vertices, topology)]
 
 
 def _counts(vertices: Tensor, topology: Topology) -> list[Quantity]:
