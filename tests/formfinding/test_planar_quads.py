@@ -99,6 +99,65 @@ def test_where_edges_turn_too_far_directions_count_more_and_what_is_left_is_said
     assert f"{twice.report['angle_mean_degrees']:.2g} now" in note
 
 
+@pytest.mark.parametrize(
+    ("ratio", "turn", "holds", "follows"),
+    [
+        (1.011, 0.5, True, "_SOFTER"),
+        (1.011, -0.3, True, "_SOFTER"),
+        (1.009, 0.2, True, None),
+        (None, 0.0, True, None),  # a flat surface
+        (1.011, 0.6, True, None),
+        (1.011, 0.2, False, None),  # what is not planar would not become so
+        (1.011, 1.1, True, "_STIFFER"),
+        (0.9, 1.1, False, "_STIFFER"),
+    ],
+)
+def test_what_follows_the_first_solve(ratio, turn, holds, follows):
+    report = {
+        "variation_over_curvature": ratio,
+        "angle_mean_degrees": 1.0 + turn,
+        "before_planar": {"angle_mean_degrees": 1.0},
+    }
+    assert MODULE._again(report, holds=holds) is (None if follows is None else getattr(MODULE, follows))
+
+
+def test_directions_count_less_where_e_is_above_c(saddle, asked, monkeypatch):
+    """And what has less E is taken."""
+    surface, mesh = saddle
+    once, _ = planar_quads(mesh, surface)
+    asked.clear()
+    monkeypatch.setattr(MODULE, "_LEAST", 0.0)
+    twice, job = planar_quads(mesh, surface)
+    assert asked == [PLANAR_QUADS, replace(PLANAR_QUADS, direction_weight=100.0)]
+    assert job.holds
+    assert twice.report["planarity_max"] < 1e-4
+    assert twice.report["normal_variation"] < once.report["normal_variation"]
+    assert turned(twice) < 1
+
+
+@pytest.mark.parametrize(("turn", "energy", "taken"), [(0.9, 0.99, True), (1.1, 0.99, False), (0.2, 1.01, False)])
+def test_less_e_is_taken_only_where_edges_turn_no_farther_than_they_may(saddle, monkeypatch, turn, energy, taken):
+    surface, mesh = saddle
+    solve, solved = MODULE.minimise_normal_variation, []
+
+    def noted(*args: Any, **kwargs: Any) -> JobResult[Level]:
+        solved.append(solve(*args, **kwargs))
+        return solved[-1]
+
+    def measured(vertices: Tensor, of: QuadMesh) -> dict[str, Any]:
+        report = measure_mesh_on(vertices, of)
+        second = len(solved) > 1
+        angle = mesh.report["angle_mean_degrees"] + (turn if second else 0.1)
+        e = energy if second else 1.0
+        return {**report, "angle_mean_degrees": angle, "normal_variation": e, "variation_over_curvature": 1.1}
+
+    monkeypatch.setattr(MODULE, "minimise_normal_variation", noted)
+    monkeypatch.setattr("torchfair.meshing.measure_mesh_on", measured)
+    made, _ = planar_quads(mesh, surface)
+    assert len(solved) == 2
+    assert torch.equal(made.vertices, solved[taken].vertices)
+
+
 def test_faces_beyond_the_distance_limit_are_told_with_what_a_mesh_can_be_asked_for(saddle, monkeypatch):
     """The settings of the solve, planar_distance among them, are not those of a mesh."""
     surface, mesh = saddle

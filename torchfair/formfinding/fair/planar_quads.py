@@ -36,6 +36,9 @@ Panels grow by half at most: since edges of the boundary have no E, panels there
 
 _TURNED = 1.0  # degrees in the mean, beyond which edges turn too far
 _STIFFER = replace(PLANAR_QUADS, direction_weight=3000.0)
+_LITTLE = 0.5  # degrees in the mean, up to which edges may turn farther for less E
+_LEAST = 1.01  # E over C, beyond which they do
+_SOFTER = replace(PLANAR_QUADS, direction_weight=100.0)
 
 
 def planar_quads(
@@ -43,9 +46,14 @@ def planar_quads(
 ) -> tuple[QuadMesh, JobResult[Level]]:
     """A principal mesh with planar polygons near the surface that it was made from.
 
-    Lowers E under ``PLANAR_QUADS``; what `torchfair mesh --planar` does. Where that turns edges away from principal
-    directions by more than 1 degree in the mean, it is done once more with directions counting ten times, from the same
-    start, and what turns them less is taken.
+    Lowers E under ``PLANAR_QUADS``; what `torchfair mesh --planar` does. There is a second solve from the same start:
+
+    - where that turns edges away from principal directions by more than 1 degree in the mean. Directions count ten
+      times then, and what turns edges less is taken;
+    - where that keeps its promises but E ends above 1.01 C, and edges turned by at most half a degree. Directions count
+      a third then, and what has less E is taken, if edges turn by at most 1 degree.
+
+    The result of a second solve is taken only where it keeps promises and limits as well as the first does.
 
     Args:
         mesh: from :func:`torchfair.meshing.principal_quads`.
@@ -87,15 +95,34 @@ def planar_quads(
         return job, {**measure_mesh_on(job.vertices, mesh), "before_planar": mesh.report}
 
     job, report = solved(PLANAR_QUADS)
-    if _turn(report) > _TURNED and not job.stopped:
-        other = solved(_STIFFER)
-        if _is_as_good(other[0], job) and _turn(other[1]) < _turn(report):
+    again = None if job.stopped else _again(report, holds=job.holds)
+    if again is not None:
+        other = solved(again)
+        is_better = _turns_less if again is _STIFFER else _has_less_energy
+        if _is_as_good(other[0], job) and is_better(other[1], report):
             job, report = other
         elif other[0].stopped:
             job = _stopped_like(other[0], job)
     solve = f"{job.steps} steps towards planar polygons: {job.message}"
     said = [*mesh.notes, *map(_in_counts, job.notes), *_turned(report), solve]
     return replace(mesh, vertices=job.vertices, report=report, notes=said), job
+
+
+def _again(report: Mapping[str, Any], *, holds: bool) -> FairSettings | None:
+    """The settings of a second solve after one with such a report; None where that was enough."""
+    turn, ratio = _turn(report), report["variation_over_curvature"]
+    if turn > _TURNED:
+        return _STIFFER
+    return _SOFTER if holds and turn <= _LITTLE and ratio is not None and ratio > _LEAST else None
+
+
+def _turns_less(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    return _turn(one) < _turn(other)
+
+
+def _has_less_energy(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether E of one report is less, with edges that turn no farther than they may."""
+    return _turn(one) <= _TURNED and one["normal_variation"] < other["normal_variation"]
 
 
 def _is_as_good(one: JobResult[Level], other: JobResult[Level]) -> bool:
