@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from helpers import grid_faces
+from helpers import grid_faces, random_rotation
 
 from torchfair import Topology
 from torchfair.meshing.boundary_cells import compact, tidy_boundary
 from torchfair.meshing.polygon_area import area_vector, area_vectors
 from torchfair.meshing.polygon_edits import PolygonEdits
+from torchfair.meshing.polygon_sides import sides_cross
 from torchfair.meshing.tracing import Cells
 
 NO_CREASES = np.zeros((0, 2), np.int64)
@@ -186,3 +187,45 @@ def test_bulges_over_one_line_are_dropped() -> None:
     outer, corner = np.ones(4, bool), np.zeros(4, bool)
     cells = Cells(positions, [[0, 1, 2, 3], [1, 0]], [[0, 1, 0, 1], [2, 0]], outer, ~corner, NO_CREASES)
     assert compact(tidy_boundary(cells, 1.0, 1.0)).faces == [[0, 1, 2, 3]]
+
+
+def test_a_collapse_that_makes_sides_cross_is_refused() -> None:
+    """A cell with a bay: with the edge (1, 2) gone the side from 0 to 2 passes on the other side of 4."""
+    positions = np.array([[0.0, 0, 0], [3, 0, 0], [3, 2, 0], [1.4, 2, 0], [1.4, 0.5, 0], [0, 2, 0]])
+    outer = np.ones(6, bool)
+    found = PolygonEdits(positions, [[0, 1, 2, 3, 4, 5]], outer, np.array([True, False, True, True, True, True]))
+    assert area_vector(positions, [0, 2, 3, 4, 5])[2] > 0
+    assert not found.collapse((1, 2))
+    found.drop_straight_nodes(0)
+    assert found.faces == {0: [0, 1, 2, 3, 4, 5]}
+    shallow = positions.copy()
+    shallow[4, 1] = 1.5
+    found = PolygonEdits(shallow, [[0, 1, 2, 3, 4, 5]], outer, np.array([True, False, True, True, True, True]))
+    assert found.collapse((1, 2))
+
+
+def crosses(corners: np.ndarray) -> bool:
+    """Naively, of a polygon in the plane: by shares along both sides."""
+    count = len(corners)
+    for i in range(count):
+        for j in range(i + 2, count - (i == 0)):
+            (a, b), (c, d) = (corners[[k, (k + 1) % count]] for k in (i, j))
+            shares = np.linalg.solve(np.stack([b - a, c - d], 1), c - a)
+            if (shares > 0).all() and (shares < 1).all():
+                return True
+    return False
+
+
+def test_sides_that_cross_are_found() -> None:
+    """As naively; in space, for both normals, wherever it begins; sides that only touch do not cross."""
+    random, turn = np.random.default_rng(0), random_rotation(3).numpy()
+    seen = []
+    for size in (4, 5, 6, 7):
+        for _ in range(40):
+            flat = random.normal(size=(size, 2))
+            seen.append(crosses(flat))
+            space = np.roll(np.c_[flat, 0 * flat[:, 0]], random.integers(size), axis=0) @ turn.T
+            assert [sides_cross(space, sign * turn[:, 2]) for sign in (1, -1)] == [seen[-1]] * 2
+    assert 20 < sum(seen) < 140
+    touching = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0, 0], [0, 2, 0]])
+    assert not sides_cross(touching, np.array([0.0, 0, 1]))

@@ -172,6 +172,13 @@ class Pieces:
     counts: list[int]
     sizes: CurvatureSizes | None
 
+    def moved(self, positions: Floats) -> Pieces:
+        """The same with vertices elsewhere, (V, 3); singular points that lie on vertices go with them."""
+        places = self.places.clone()
+        which, vertex = np.nonzero((places.numpy()[:, None] == self.positions).all(-1))
+        places[torch.from_numpy(which)] = torch.from_numpy(positions[vertex])
+        return replace(self, positions=positions, places=places)
+
 
 def mesh_components(
     surface: ReadSurface,

@@ -9,8 +9,7 @@ import numpy as np
 from ..fields.frames import Bools, Floats, Ints
 from ..topology import Topology
 
-_ACUTE = np.radians(25.0)  # angles may fall to that
-_STRAIGHT = np.radians(185.0)  # and rise to that
+_STRAIGHT = np.radians(185.0)  # angles may rise to that
 _SHORT = 0.3  # spacings: sides may shrink to that, shorter ones by a tenth
 _SHRUNK = 0.9
 _SMALL = 0.1  # squared spacings: areas may fall to that
@@ -42,8 +41,8 @@ class FaceRoom:
     areas: Floats
 
     @classmethod
-    def of(cls, topology: Topology, points: Floats, spacing: float) -> FaceRoom:
-        """What the faces of a mesh with vertices (V, 3) have to keep."""
+    def of(cls, topology: Topology, points: Floats, spacing: float, acute: float) -> FaceRoom:
+        """What the faces of a mesh with vertices (V, 3) have to keep; angles may fall to ``acute``, radians."""
         sizes = topology.face_sizes.numpy()
         starts = np.cumsum(sizes) - sizes
         face = np.repeat(np.arange(len(sizes)), sizes)
@@ -61,7 +60,7 @@ class FaceRoom:
             ahead,
             back,
             room.normals,
-            np.stack([np.minimum(angles, _ACUTE) - _ROUNDING, np.maximum(angles, _STRAIGHT) + _ROUNDING]),
+            np.stack([np.minimum(angles, acute) - _ROUNDING, np.maximum(angles, _STRAIGHT) + _ROUNDING]),
             _SHRUNK * np.minimum(lengths, _SHORT * spacing),
             np.minimum(areas, _SMALL * spacing**2) * (1 - _ROUNDING),
         )

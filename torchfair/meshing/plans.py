@@ -9,10 +9,11 @@ from ..settings.meshing_settings import MeshingSettings
 from .attempt import Plan
 
 _SMOOTHER = (1.0, 4.0, 16.0, 64.0)  # times the smoothing length
-_ROWS = ((1.0, 0.0), (1.0, 0.3), (1.0, 10.0), (4.0, 0.0), (1.0, 0.3), (1.0, 10.0), (16.0, 0.0), (64.0, 0.0))
+_ROWS = ((1.0, 0.0), (1.0, 0.3), (1.0, 10.0), (4.0, 0.0), (1.0, 0.3), (1.0, 10.0), (4.0, 3.0), (16.0, 0.0), (64.0, 0.0))
 """The same for lattices with rows, and how crosses are made even; at first where the plan before failed by far."""
 
-_SPACINGS = (1.0, 0.967, 1.037, 0.934, 1.08)  # counts up and down by 7 and 15 %
+SCALES = (1.0, 0.967, 1.037, 0.934, 1.08)
+"""Of spacings: counts up and down by 7 and 15 %."""
 
 Kind = tuple[float, bool, bool, float]
 
@@ -55,7 +56,7 @@ def plans(
     for kept in (True, False) if creased else (False,):
         can_align = settings.align_boundary or kept
         curves = "boundary and creases" if kept else "boundary"
-        for scale in _SPACINGS:
+        for scale in SCALES:
             for number, (smoother, even) in enumerate(_ROWS if rows else [(of, 0.0) for of in _SMOOTHER]):
                 for align in (True, False) if can_align else (False,):
                     words = [
@@ -63,7 +64,12 @@ def plans(
                         f"directions smoothed over {smoothing * smoother:g} edges" if smoother != 1 else "",
                         "rows not along the same principal curvature everywhere" if even else "",
                         f"{curves} not aligned" if can_align and not align else "",
-                        f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces" if scale != 1 else "",
+                        scaled_words(scale) if scale != 1 else "",
                     ]
                     plan = Plan(spacing * scale, spacing * smoothing * smoother, align, kept, even)
                     yield Rung(plan, ", ".join(filter(None, words)), scale, smoother, even > 0 and number < 3)
+
+
+def scaled_words(scale: float) -> str:
+    """How many more or fewer faces there are with spacings scaled by a factor."""
+    return f"{abs(scale**-2 - 1):.0%} {'more' if scale < 1 else 'fewer'} faces"

@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 
+from ..fields.frames import Floats
 from .polygon_area import area_vector
 from .polygon_faces import Edge, PolygonFaces
+from .polygon_sides import sides_cross
 
 _TURN_DIGITS = 6  # of angles that are compared, so that rounding does not decide
 
@@ -24,7 +26,8 @@ class PolygonEdits(PolygonFaces):
                 of two ends that may stay it is the one for which less turns.
 
         Returns:
-            Whether it is an edge and that left a manifold without faces turned over; otherwise nothing has changed.
+            Whether it is an edge and that left a manifold, with no face turned over or with sides that cross; otherwise
+            nothing has changed.
         """
         stays, goes = edge[::-1] if self._outranks(*edge[::-1]) else edge
         if math.isinf(most):
@@ -90,12 +93,12 @@ class PolygonEdits(PolygonFaces):
         return self._apply(changed)
 
     def drop_straight_nodes(self, number: int) -> None:
-        """Takes nodes out of a face that it has alone, apart from fixed ones."""
+        """Takes nodes out of a face that it has alone, apart from fixed ones, while no sides cross."""
         for node in list(self.faces[number]):
             face = self.faces[number]
             if len(face) > 3 and len(self.around[node]) == 1 and not self.fixed[node]:
                 without = [other for other in face if other != node]
-                if area_vector(self.positions, without) @ self.normals[number] > 0:
+                if self._is_sound(without, self.normals[number]):
                     self.faces[number] = without
                     del self.around[node]
 
@@ -112,7 +115,14 @@ class PolygonEdits(PolygonFaces):
     def _keeps_side(self, number: int, face: list[int]) -> bool:
         normal = self.normals[number]
         area = area_vector(self.positions, face)
-        return float(area @ normal) > 0.2 * float(np.linalg.norm(area)) * float(np.linalg.norm(normal))
+        ahead = float(area @ normal) > 0.2 * float(np.linalg.norm(area)) * float(np.linalg.norm(normal))
+        return ahead and self._is_sound(face, normal)
+
+    def _is_sound(self, face: list[int], normal: Floats) -> bool:
+        """Whether a face has an area seen along a normal, and no sides that cross."""
+        if float(area_vector(self.positions, face) @ normal) <= 0:
+            return False
+        return len(face) == 3 or not sides_cross(self.positions[face], normal)
 
     def _is_fan(self, node: int, changed: dict[int, list[int]]) -> bool:
         """Whether the faces around a node are one fan, open or closed."""

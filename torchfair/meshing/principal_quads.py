@@ -16,6 +16,7 @@ from .curvature_sizes import CurvatureSizes, curvature_sizes
 from .lattice import SQUARES
 from .quad_mesh import QuadMesh
 from .report import measure
+from .turned_over import told, turned_over
 from .verification import verified_topology
 
 
@@ -86,6 +87,8 @@ def principal_quads(
     if not (chosen.adaptive and chosen.spacing_range > 1):
         pieces = aligned(pieces, surface, size, chosen)
     pieces = on_surface(pieces, surface, chosen)
+    over = turned_over(pieces, surface)
+    notes = [told(pieces, over, "face", "triangles")] if len(over) else []
     faces, positions = pieces.faces, torch.from_numpy(pieces.positions)
     made = verified_topology(faces, len(positions), surface.shape)
     report = measure(positions, made, surface, size, pieces.indices, pieces.creases)
@@ -97,5 +100,5 @@ def principal_quads(
         surface,
         pieces.creases.to(vertices),
         {**report, **(pieces.sizes.report(size) if pieces.sizes else {})},
-        [*surface.notes, *pieces.notes],
+        [*surface.notes, *pieces.notes, *notes],
     )
