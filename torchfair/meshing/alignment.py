@@ -50,8 +50,8 @@ def aligned(
 
     A vertex at a singular point takes it along. Where angles of a component do not fall in the mean and in their
     95 %, by the sum of the one and a quarter of the other, all its vertices stay; also where that sum is below 0.001
-    at first. Of triangles those of the best round are taken, without rounds that raise E where K is negative by more
-    than 0.2 %.
+    at first. Of triangles those of the last round are taken in which E is no more than 0.2 % above that
+    at first where K is negative.
 
     Vertices on the boundary and on creases stay. So do those whose faces would have too little room, see
     :class:`FaceRoom`; faces keep their corners.
@@ -95,20 +95,15 @@ def _aligned(
         return start
     room = FaceRoom.of(topology, start, spacing, _ACUTE if rows is None else _ACUTE_OF_TRIANGLES)
     middles, feet = ClosestPointTracker(surface.reference), ClosestPointTracker(surface.reference)
-    points, made = start, []
+    most = np.inf if rows is None else (1 + _ROUGHER) * _saddle_energy(start, topology, surface)
+    points = best = start
     for _ in range(_ROUNDS):
         moves = _moves(points, start, topology, steps, surface, spacing, smoothing, held, middles, feet)
         moved = points + _with_room(room, points, moves, held)
-        on = feet.closest(torch.from_numpy(moved)).positions.numpy()
-        points = np.where(held[:, None], start, on)
-        made.append(points)
-    if rows is None:
-        made = made[-1:]
-    else:
-        most = (1 + _ROUGHER) * _saddle_energy(start, topology, surface)
-        made = [of for of in made if _saddle_energy(of, topology, surface) <= most]
-    rated = [(off, start), *((_off(of, topology, steps, surface, spacing), of) for of in made)]
-    return min(rated, key=lambda pair: pair[0])[1]
+        points = np.where(held[:, None], start, feet.closest(torch.from_numpy(moved)).positions.numpy())
+        if rows is None or _saddle_energy(points, topology, surface) <= most:
+            best = points
+    return best if _off(best, topology, steps, surface, spacing) < off else start
 
 
 def _saddle_energy(points: Floats, topology: Topology, surface: ReadSurface) -> float:

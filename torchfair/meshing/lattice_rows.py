@@ -25,6 +25,7 @@ from .three_valent import with_three_valent_inside
 from .turned_over import counted, told, turned_over
 from .unfolding import unfolded
 
+_COARSE = 5000  # vertices: edges of finer meshes are no longer chords of lines that turn, and little is won
 _SAID = 0.15  # by which a count may differ without a word
 
 
@@ -149,7 +150,7 @@ class RowLattice:
         inside = with_three_valent_inside(pieces, surface)
         pieces = unfolded(inside, surface)
         has_moved = pieces is not inside
-        if not (settings.adaptive and settings.spacing_range > 1):
+        if len(pieces.positions) <= _COARSE and not (settings.adaptive and settings.spacing_range > 1):
             pieces = aligned(pieces, surface, spacing, settings, has_rows=True)
         pieces = on_surface(pieces, surface, settings)
         return _Laid(pieces, spacing, across, turned_over(pieces, surface), has_moved)

@@ -36,8 +36,10 @@ def principal_triangles(
     equilateral triangles where that brings E nearer to C: all by one ratio, or with ``settings.adaptive`` each by the
     curvatures in its place, with edges in proportion to ``1 / sqrt|k|`` for the larger one k.
 
-    Rows along the other curvature are taken where triangles would be turned over, as on the ends of long ellipsoids; a
-    note says so, and where triangles still are.
+    Once they are laid, vertices inside move along the surface until rows turn to the directions there, and corners of
+    triangles that are turned over, as on the ends of long ellipsoids, between their neighbours. Rows along the other
+    curvature are taken where some would stay turned over or E would be higher for that; a note says so, and where
+    triangles still are.
 
     Args:
         vertices: (V, 3) positions of the surface, any length unit.
