@@ -140,7 +140,7 @@ def test_fields_that_cannot_be_made_even_are_tried_once(monkeypatch: pytest.Monk
     surface = read_surface(*irregular(PrincipalParaboloid(), 600), MeshingSettings())
     with pytest.raises(NoMeshError):
         mesh_component(surface.parts[0], surface.fields[0], triangle_lattice(0.9), 0.5, 0.25, MeshingSettings())
-    assert sorted(tried) == 8 * [0.0] + [0.3, 0.3, 10.0, 10.0]  # aligned with the boundary and not
+    assert sorted(tried) == 8 * [0.0] + [0.3, 0.3, 3.0, 3.0, 10.0, 10.0]  # aligned with the boundary and not
 
 
 def test_steps_go_the_way_in_which_they_are_apart() -> None:
