@@ -20,7 +20,8 @@ def unfolded(pieces: Pieces, surface: ReadSurface) -> Pieces:
     Edges on rows that turn back around an umbilic pass on its far side where rows lie much closer than vertices on
     them, as on the ends of long ellipsoids. There are hardly any directions there, so that vertices may move: corners
     of triangles that are turned over go to the mean of the vertices around them, and back onto the surface, until
-    there are none; every eighth round those one ring further around move, too. Vertices on the boundary and on creases stay.
+    there are none; after every eight rounds one more ring around them moves, too. Vertices on the boundary and on
+    creases stay.
 
     Args:
         pieces: triangles on those of the surface.
