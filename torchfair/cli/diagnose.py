@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._remembered import remembering
 from ..progress import phase
 from .arguments import count
 from .chosen_vertices import NUMBERS, ChosenVertices
@@ -78,6 +77,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Checks what can be checked first, then reads, judges, writes and prints."""
+    from .._remembered import remembering
     from ..measuring import diagnose_mesh, layout_advice
 
     files = _files(arguments)
