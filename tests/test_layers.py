@@ -19,6 +19,7 @@ FLOORS = (
         "_reading_words",
         "_staged",
         "_portions",
+        "_remembered",
         "_tracing",
         "cameras",
         "linear",

@@ -89,10 +89,10 @@ def test_files_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     path = tmp_path / "m.obj"
     path.write_text("v 0 0 0")
 
-    def refuse(self: Path) -> bytes:
+    def refuse(self: Path, *_how: object, **_named: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(MeshFileError, match=r"cannot be read \(Permission denied\)"):
         load_mesh(path)
 
