@@ -10,7 +10,6 @@ from torch import Tensor
 
 from torchfair import ShapeError, Topology
 from torchfair.geometry import balanced_normals, corrected_shape_operators, face_normals
-from torchfair.geometry.corrected_shape_operator import _of_faces, _of_polygons
 from torchfair.shapes import Cylinder, Sphere, Torus, irregular_triangles, parameter_quads, parameter_triangles
 
 
@@ -128,10 +127,26 @@ def test_one_set_of_normals_serves_a_batch():
     torch.testing.assert_close(stars[1], 2 * stars[0])
 
 
-@pytest.mark.parametrize("triangles", [False, True])
-def test_faces_with_equally_many_corners_are_summed_like_any_polygons(triangles: bool) -> None:
-    vertices, topology = wavy_grid(6, 5, triangles=triangles)
+def corner_by_corner(vertices: Tensor, topology: Topology, normals: Tensor) -> Tensor:
+    """The same sums over all corners of any polygons, not by faces with equally many of them."""
+    corners, faces, following = topology.corners, topology.corner_faces, topology.next_corners
+    points, at, sizes = vertices[corners], normals[corners], topology.face_sizes[:, None]
+    chord = torch.zeros_like(points)
+    chord[following] = points[following[following]] - points  # x_{i+1} - x_{i-1}
+    mean = normals.new_zeros(topology.num_faces, 3).index_add(0, faces, at) / sizes
+    per_corner = (cross(mean[faces], at)[:, :, None] * chord[:, None, :]).flatten(-2) / 2
+    per_face = normals.new_zeros(topology.num_faces, 9).index_add(0, faces, per_corner) / sizes
+    stars = normals.new_zeros(topology.num_vertices, 9).index_add(0, corners, per_face[faces])
+    return stars.view(-1, 3, 3)
+
+
+@pytest.mark.parametrize("faces", ["quads", "triangles", "both"])
+def test_faces_with_equally_many_corners_are_summed_like_any_polygons(faces: str) -> None:
+    vertices, topology = wavy_grid(6, 5, triangles=faces == "triangles")
+    if faces == "both":
+        (a, b, c, d), *others = topology.face_lists()
+        topology = Topology.from_faces([[a, b, c], *others, [a, c, d]], len(vertices))
     vertices = vertices.to(DOUBLE)
     normals = balanced_normals(vertices, topology)
-    found = _of_faces(vertices, normals, topology.corners.view(topology.num_faces, -1))
-    assert torch.equal(found, _of_polygons(vertices, normals, topology))
+    found = corrected_shape_operators(vertices, topology, normals)
+    assert torch.equal(found, corner_by_corner(vertices, topology, normals))

@@ -7,11 +7,10 @@ import functools
 import torch
 from torch import Tensor
 
-from .._portions import portions_unless
 from ..errors import ShapeError
 from ..topology import Topology
 from ._any_size import of_any_size
-from ._ops import cross, face_groups, gather, scatter_sum
+from ._ops import cross, gather, map_faces, scatter_sum
 from .balanced_normals import balanced_normals
 
 
@@ -65,37 +64,18 @@ def corrected_shape_operators(vertices: Tensor, topology: Topology, normals: Ten
     elif normals.shape[-2:] != vertices.shape[-2:] or not normals.is_floating_point():
         expected = "a floating tensor (*batch, V, 3), one unit normal per vertex"
         raise ShapeError("normals", expected, f"{tuple(normals.shape)} {normals.dtype}")
-    (_, corners), *others = face_groups(topology)
-    if others:
-        per_face = _of_polygons(vertices, normals, topology)
-    else:
-        portions = portions_unless(vertices.requires_grad or normals.requires_grad, len(corners), vertices)
-        per_face = torch.cat([_of_faces(vertices, normals, corners[part]) for part in portions], dim=-2)
+    both = torch.cat(torch.broadcast_tensors(vertices, normals), dim=-1)  # type: ignore[no-untyped-call]
+    per_face = map_faces(both, topology, _share)
     stars = scatter_sum(gather(per_face, topology.corner_faces), topology.corners, topology.num_vertices)
     return stars.reshape((*stars.shape[:-1], 3, 3))
 
 
-def _of_faces(vertices: Tensor, normals: Tensor, corners: Tensor) -> Tensor:
-    """The share (*batch, n, 9) of every corner of faces (n, k) with equally many corners."""
-    points, at_corners = gather(vertices, corners), gather(normals, corners)
+def _share(corners: Tensor) -> Tensor:
+    """What every corner of faces with corners and their normals (*batch, n, k, 6) has of their sums: (*batch, n, 9)."""
+    points, normals = corners[..., :3], corners[..., 3:]
     chord = points.roll(-1, -2) - points.roll(1, -2)
-    size = corners.shape[1]
-    mean = functools.reduce(torch.add, at_corners.unbind(-2)) / size
-    axis = cross(mean[..., None, :].expand_as(at_corners), at_corners)
+    size = corners.shape[-2]
+    mean = functools.reduce(torch.add, normals.unbind(-2)) / size
+    axis = cross(mean[..., None, :].expand_as(normals), normals)
     per_corner = (axis[..., :, None] * chord[..., None, :]).flatten(-2) / 2
     return functools.reduce(torch.add, per_corner.unbind(-2)) / size
-
-
-def _of_polygons(vertices: Tensor, normals: Tensor, topology: Topology) -> Tensor:
-    """The same (*batch, F, 9) of any faces."""
-    points, corner_normals = gather(vertices, topology.corners), gather(normals, topology.corners)
-    ahead = gather(points, topology.next_corners)
-    # Of the corner after the next, seen from the next one: x_{i+1} - x_{i-1}.
-    chord = torch.zeros_like(points).index_copy(
-        -2, topology.next_corners, gather(ahead, topology.next_corners) - points
-    )
-    sizes = topology.face_sizes[:, None]
-    mean = scatter_sum(corner_normals, topology.corner_faces, topology.num_faces) / sizes
-    axis = cross(gather(mean, topology.corner_faces), corner_normals)
-    per_corner = (axis[..., :, None] * chord[..., None, :]).flatten(-2) / 2
-    return scatter_sum(per_corner, topology.corner_faces, topology.num_faces) / sizes
