@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from ..fields.frames import Floats
 from .polygon_area import area_vector
 from .polygon_faces import Edge, PolygonFaces
 from .polygon_sides import sides_cross
@@ -98,7 +97,10 @@ class PolygonEdits(PolygonFaces):
             face = self.faces[number]
             if len(face) > 3 and len(self.around[node]) == 1 and not self.fixed[node]:
                 without = [other for other in face if other != node]
-                if self._is_sound(without, self.normals[number]):
+                normal = self.normals[number]
+                if area_vector(self.positions, without) @ normal > 0 and not sides_cross(
+                    self.positions[without], normal
+                ):
                     self.faces[number] = without
                     del self.around[node]
 
@@ -116,13 +118,7 @@ class PolygonEdits(PolygonFaces):
         normal = self.normals[number]
         area = area_vector(self.positions, face)
         ahead = float(area @ normal) > 0.2 * float(np.linalg.norm(area)) * float(np.linalg.norm(normal))
-        return ahead and self._is_sound(face, normal)
-
-    def _is_sound(self, face: list[int], normal: Floats) -> bool:
-        """Whether a face has an area seen along a normal, and no sides that cross."""
-        if float(area_vector(self.positions, face) @ normal) <= 0:
-            return False
-        return len(face) == 3 or not sides_cross(self.positions[face], normal)
+        return ahead and not sides_cross(self.positions[face], normal)
 
     def _is_fan(self, node: int, changed: dict[int, list[int]]) -> bool:
         """Whether the faces around a node are one fan, open or closed."""

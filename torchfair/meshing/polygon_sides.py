@@ -16,6 +16,8 @@ def sides_cross(corners: Floats, normal: Floats) -> bool:
         corners: (n, 3) in order.
         normal: (3,) of any length but zero.
     """
+    if len(corners) == 3:
+        return False
     ahead = np.roll(corners, -1, axis=0) - corners
     x, y, z = ahead.T
     across = np.stack([normal[1] * z - normal[2] * y, normal[2] * x - normal[0] * z, normal[0] * y - normal[1] * x], 1)
