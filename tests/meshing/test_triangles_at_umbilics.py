@@ -13,7 +13,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.geometry import face_centres, face_normals
-from torchfair.meshing import MeshingSettings, TriangleMesh, lattice_rows, principal_triangles
+from torchfair.meshing import MeshingSettings, TriangleMesh, lattice_rows, principal_triangles, unfolding
 from torchfair.meshing.components import Pieces, ReadSurface, read_surface
 from torchfair.meshing.mesh_creases import MeshCreases
 from torchfair.meshing.three_valent import between, with_three_valent_inside
@@ -143,6 +143,26 @@ def test_other_counts_are_tried_where_triangles_stay_turned_over(monkeypatch: py
     found = principal_triangles(*ellipsoid(HALF_LONG), count=200)
     assert numbers == []
     assert found.notes == ["7% fewer faces: as asked for, 2 triangles are turned over"]
+
+
+def test_counts_that_are_too_far_off_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    numbers = [2, 3, 0, 0, 0, 0, 0, 0, 0, 0]
+    monkeypatch.setattr(lattice_rows, "turned_over", lambda *_: torch.arange(numbers.pop(0)))
+    monkeypatch.setattr(lattice_rows.RowLattice, "_off", lambda self, made: 0.151 if made.words else 0.0)
+    found = principal_triangles(*ellipsoid(HALF_LONG), count=200)
+    assert numbers == []  # all of them were tried
+    assert len(found.notes) == 1
+    assert found.notes[0].startswith("2 triangles are turned over")
+
+
+def test_where_as_many_stay_turned_over_nothing_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    vertices, topology = ellipsoid(HALF_LONG)
+    given, surface = (
+        pieces_of(vertices, topology.triangles.tolist()),
+        read_surface(vertices, topology, MeshingSettings()),
+    )
+    monkeypatch.setattr(unfolding, "turned_over", lambda *_: torch.tensor([5]))
+    assert unfolded(given, surface) is given
 
 
 def inner_valences(mesh: TriangleMesh) -> list[int]:
