@@ -150,12 +150,12 @@ def total(rows: list[dict[str, int]]) -> dict[str, int]:
 
 
 def table(report: dict[str, dict[str, int]]) -> str:
-    """Shares in percent, one line for each sampling."""
-    names = (*COLUMNS, *ORDINARY, *MANY)
-    lines = ["| sampling | stars | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
-    for sampling, row in report.items():
-        shares = (_percent(row[name], row["stars"]) for name in names)
-        lines.append(f"| {sampling} | {row['stars']} | " + " | ".join(shares) + " |")
+    """Shares in percent, one column for each sampling."""
+    lines = ["| | " + " | ".join(report) + " |", "|---" * (len(report) + 1) + "|"]
+    lines.append("| stars | " + " | ".join(str(row["stars"]) for row in report.values()) + " |")
+    for name in (*COLUMNS, *ORDINARY, *MANY):
+        shares = (_percent(row[name], row["stars"]) for row in report.values())
+        lines.append(f"| {name} | " + " | ".join(shares) + " |")
     return "\n".join(lines) + "\n"
 
 
