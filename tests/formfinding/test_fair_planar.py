@@ -14,7 +14,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.formfinding import FairRecipe, FairSettings, minimise_normal_variation
-from torchfair.formfinding.fair import problem as problem_module
+from torchfair.formfinding.fair import planarity_goal
 from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.formfinding.job.plan import Stage
 from torchfair.geometry import corner_angles
@@ -84,7 +84,7 @@ def test_weights_that_cannot_make_faces_planar_are_not_raised_further(monkeypatc
 
     As it is where fewer faces are so far from planar.
     """
-    monkeypatch.setattr(problem_module, "_LARGEST_MEAN_WARP", math.inf)
+    monkeypatch.setattr(planarity_goal, "_LARGEST_MEAN_WARP", math.inf)
     shares, planar = stages(monkeypatch)
     settings = FairSettings(planar="quads", continuation=())
     result = minimise_normal_variation(*quad(0.4), settings=settings)
@@ -113,7 +113,7 @@ def test_faces_that_can_become_planar_come_out_as_if_that_had_not_been_asked_fir
     _, planar = stages(monkeypatch)
     asked = minimise_normal_variation(vertices, topology, reference=surface, settings=settings)
     assert planar[0] == 0
-    monkeypatch.setattr(problem_module, "_LARGEST_MEAN_WARP", math.inf)
+    monkeypatch.setattr(planarity_goal, "_LARGEST_MEAN_WARP", math.inf)
     plain = minimise_normal_variation(vertices, topology, reference=surface, settings=settings)
     assert asked.holds
     assert torch.equal(asked.vertices, plain.vertices)
@@ -137,7 +137,7 @@ def test_faces_are_far_from_planar_whose_corners_would_go_beyond_the_limit(
 ) -> None:
     """By half of what their diagonals are apart; where it is known how far that is, and no handles pull."""
     recipe = FairRecipe(*quad(warp), settings=settings, handles=handles)
-    assert recipe.problem.is_far_from_planar(recipe.start) is far
+    assert recipe.problem.planarity.is_far(recipe.start) is far
 
 
 def test_vertices_off_the_surface_have_room_while_e_is_lowered() -> None:

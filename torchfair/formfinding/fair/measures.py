@@ -117,7 +117,7 @@ def _distance_promises(problem: FairProblem, before: Mapping[str, float], after:
     settings, promises = problem.settings, []
     bounded = problem.near.limits is not None and not problem.near.design_mode
     if bounded:
-        asked = max(settings.distance_limit or 0.0, problem.distance_for_planarity)
+        asked = max(settings.distance_limit or 0.0, problem.planarity.distance)
         most, reached = max(asked, before["largest_distance_relative"]), after["largest_distance_relative"]
         remedy = "raise distance_limit, or pull less"
         promises.append(

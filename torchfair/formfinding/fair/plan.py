@@ -11,7 +11,6 @@ from torch import Tensor
 from ...projection.layout import State
 from ..job.plan import Plan, Stages
 from .iterative import with_solver
-from .panels import PLANAR_PROMISE
 from .problem import FairProblem
 
 _SHARE_STEP = 1.0 / 6.0  # one power of ten of the default weight of planarity
@@ -62,11 +61,11 @@ class FairPlan(Plan):
         """
         problem, start = self._problem, self.state["vertices"]
         every = problem.settings.projection.takes_every_step
-        problem.most_warped = math.inf
-        if not every and problem.is_far_from_planar(start):
+        problem.planarity.most_warped = math.inf
+        if not every and problem.planarity.is_far(start):
             yield from self._planar_alone(start, problem.settings.planar_distance)
             tried = self.state["vertices"]
-            if problem.largest_warp(tried) > PLANAR_PROMISE:
+            if not problem.planarity.is_reached(tried):
                 yield from self._best_of(start, [tried])
                 return
             problem.near.put_back()
@@ -75,7 +74,7 @@ class FairPlan(Plan):
         if every or not problem.panels.makes_planar:
             return
         energy, first = problem.energy(start), self.state["vertices"]
-        near_enough = problem.is_planar_within_limits(first)
+        near_enough = problem.planarity.is_reached_within_limits(first)
         if near_enough and problem.energy(first) <= _LITTLE_MORE * energy:
             if problem.energy(first) > energy and self._may_stay(start):
                 self.state = problem.blocks(start)
@@ -85,29 +84,30 @@ class FairPlan(Plan):
 
     def _best_of(self, start: Tensor, found: list[Tensor]) -> Stages:
         """The best of the meshes that were found and, if none has planar faces, what else can be made of the start."""
-        problem, warp = self._problem, self._problem.largest_warp(start)
-        planar = [vertices for vertices in found if problem.largest_warp(vertices) <= PLANAR_PROMISE]
-        meeting = None if planar else problem.where_planes_meet(start)
+        problem, planarity = self._problem, self._problem.planarity
+        warp = planarity.largest_warp(start)
+        planar = [vertices for vertices in found if planarity.is_reached(vertices)]
+        meeting = None if planar else planarity.where_planes_meet(start)
         if meeting is not None:
             yield from self._made_planar(meeting, problem.settings.planar_distance)
             found.append(self.state["vertices"])
-            planar = [found[-1]] if problem.largest_warp(found[-1]) <= PLANAR_PROMISE else []
+            planar = [found[-1]] if planarity.is_reached(found[-1]) else []
         if planar:
-            best = min(planar, key=lambda mesh: (not problem.is_planar_within_limits(mesh), problem.energy(mesh)))
+            best = min(planar, key=lambda mesh: (not planarity.is_reached_within_limits(mesh), problem.energy(mesh)))
         else:
-            best = min(found, key=problem.largest_warp)
-            if problem.largest_warp(best) > _WORTHWHILE * warp:
+            best = min(found, key=planarity.largest_warp)
+            if planarity.largest_warp(best) > _WORTHWHILE * warp:
                 self.state = problem.blocks(start)
                 yield from self._not_warped_more(warp)
                 return
-        problem.takes_for_planarity(best)
+        planarity.takes(best)
         self.state = problem.blocks(best)
 
     def _may_stay(self, start: Tensor) -> bool:
         """Whether the start has planar faces, flat edges and all else that is asked for already."""
         problem = self._problem
         asked = problem.panels.are_planar(problem.placed(problem.blocks(start))) and not problem.pulls.pulled.any()
-        return asked and problem.is_planar_within_limits(start)
+        return asked and problem.planarity.is_reached_within_limits(start)
 
     def _lowered(self, portions: list[Portion], start: Tensor, most: float) -> Stages:
         """The portions, and planarity once more where the last one was not enough; none that cannot make it enough."""
@@ -130,12 +130,12 @@ class FairPlan(Plan):
         """Makes faces planar near the start, as far away as that takes and at most so far, and lowers E from there."""
         yield from self._planar_alone(start, most)
         problem, planar = self._problem, self.state["vertices"]
-        if problem.largest_warp(planar) > PLANAR_PROMISE:
+        if not problem.planarity.is_reached(planar):
             return
         problem.near.lift(planar, room=_ROOM)
         yield from self._lowered([Portion(1.0, 1.0)], planar, _LARGEST_SHARE)
         lowered = self.state["vertices"]
-        if problem.largest_warp(lowered) > PLANAR_PROMISE or problem.energy(lowered) > problem.energy(planar):
+        if not problem.planarity.is_reached(lowered) or problem.energy(lowered) > problem.energy(planar):
             self.state = problem.blocks(planar)
 
     def _planar_alone(self, start: Tensor, most: float) -> Stages:
@@ -156,7 +156,7 @@ class FairPlan(Plan):
         problem = self._problem
         problem.near.put_back()
         problem.reconsider()
-        problem.most_warped = warp
+        problem.planarity.most_warped = warp
         yield problem.stage(self.state, _WEAK, 1.0, problem.settings.projection)
         self.state = problem.blocks(self.state["vertices"])
 

@@ -13,7 +13,7 @@ from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level
 from .panels import PLANAR_PROMISE
-from .problem import KEEP_LIMIT
+from .planarity_goal import KEEP_LIMIT
 from .recipe import minimise_normal_variation
 
 if TYPE_CHECKING:

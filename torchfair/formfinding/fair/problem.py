@@ -20,23 +20,19 @@ from ..job.pulls import Pulls
 from ..references import GivenReference
 from .edge_guide import EdgeGuide, WantedDirections
 from .face_bounds import FaceBounds
-from .face_planes import on_face_planes
 from .feature_curves import FeatureCurves, feature_curves
 from .free_boundary import FreeBoundary
 from .gliding_boundary import GlidingBoundary
 from .guard import FairGuard
 from .nearness import Nearness
-from .panels import PLANAR_PROMISE, Panels
+from .panels import Panels
+from .planarity_goal import PlanarityGoal
 from .scales import Scales, scales
 from .terms import fair_terms, planar_terms
 
 _LONGEST_PULL = 0.5  # mean edge lengths that a handle moves in one stage
 _PLANARITY_STAGES = 8
 _MOST_STAGES = 20
-_LARGEST_MEAN_WARP = 0.05  # relative planarity: of 47 meshes that became planar none had more than 0.02
-
-KEEP_LIMIT = ": planar_distance 0 to keep that"
-"""How a note ends that says that planar faces lie beyond the distance limit: what settings can do."""
 
 
 class FairProblem:
@@ -65,8 +61,7 @@ class FairProblem:
         has_other_goals: Whether E may rise: handles, another reference or planarity ask for a different shape.
         panels: Faces that are kept planar and edges that are kept flat.
         loose: (V,) bool, corners of boundary and creases that become planar faces may take along.
-        most_warped: Relative planarity that no face may exceed that should be planar but cannot become so.
-        distance_for_planarity: How far planar faces may take the mesh from the reference, in mean edges of the input.
+        planarity: Planar faces as a goal, and what they may cost.
         boundary: Curves on which vertices of the boundary and of creases glide; None if none do.
         notes: Decisions taken, in words.
     """
@@ -98,7 +93,7 @@ class FairProblem:
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
         self.boundary = self._gliding_boundary()
-        self.most_warped, self.distance_for_planarity = math.inf, 0.0
+        self.planarity = PlanarityGoal(self)
         self.near = self._nearness(reference or (vertices, topology), surface)
 
     def _nearness(self, reference: GivenReference, surface: Reference | None = None) -> Nearness:
@@ -139,12 +134,13 @@ class FairProblem:
 
     def snapshot(self) -> Callable[[], None]:
         """A function that puts back what handles have changed."""
-        put_back_near = self.near.snapshot()
-        of_planarity = self.has_other_goals, self.most_warped, self.distance_for_planarity
+        put_back_near, put_back_planarity = self.near.snapshot(), self.planarity.snapshot()
+        has_other_goals = self.has_other_goals
 
         def put_back() -> None:
             put_back_near()
-            self.has_other_goals, self.most_warped, self.distance_for_planarity = of_planarity
+            put_back_planarity()
+            self.has_other_goals = has_other_goals
             self.__dict__.pop("guard", None)
 
         return put_back
@@ -201,60 +197,9 @@ class FairProblem:
             guard=self.admits,
         )
 
-    def largest_warp(self, vertices: Tensor) -> float:
-        """Largest relative planarity of the faces kept planar, with gliding ``vertices`` (V, 3) put in place."""
-        warped = self.panels.warps(self.placed({"vertices": vertices}))
-        return float(warped.max()) if warped.numel() else 0.0
-
-    def is_planar_within_limits(self, vertices: Tensor) -> bool:
-        """Whether the faces of ``vertices`` (V, 3) are planar as promised, within the limits of the start."""
-        return self.largest_warp(vertices) <= PLANAR_PROMISE and not self._leaves_limits(vertices)
-
-    def is_far_from_planar(self, vertices: Tensor) -> bool:
-        """Whether faces of a mesh (V, 3) that are to be planar would, in the mean, take corners beyond the limit.
-
-        Along the normal each corner of a quad has to go half of the distance between its diagonals. Not where handles
-        pull, which have to go on step by step.
-        """
-        limit = self.settings.distance_limit
-        if limit is None or not self.panels.makes_planar or self.pulls.pulled.any():
-            return False
-        warped = self.panels.warps(self.placed({"vertices": vertices}))
-        return float(warped.mean()) > max(2.0 * limit, _LARGEST_MEAN_WARP)
-
-    def where_planes_meet(self, vertices: Tensor) -> Tensor | None:
-        """A start (V, 3) nearer to planar faces, far off within the tangent planes; None if it breaks bounds."""
-        stay = self.stays() | self.pulls.pulled | self.pulls.held
-        moved = torch.where(stay[:, None], vertices, on_face_planes(vertices, self.topology, self.panels.planar))
-        state, trial = {"vertices": vertices}, {"vertices": moved}
-        if torch.equal(moved, vertices) or not (
-            self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
-        ):
-            return None
-        return None if not self.settings.planar_distance and self._leaves_limits(moved) else moved
-
-    def _leaves_limits(self, vertices: Tensor) -> bool:
-        limits = self.near.limits
-        return limits is not None and bool((self.near.distances(self.placed({"vertices": vertices})) > limits).any())
-
     def energy(self, vertices: Tensor) -> float:
         """E, with gliding ``vertices`` (V, 3) put in place."""
         return self.guard.energy({"vertices": vertices})
-
-    def takes_for_planarity(self, vertices: Tensor) -> None:
-        """Takes in what the best ``vertices`` (V, 3) with planar faces cost: distance from the reference, and E."""
-        self.has_other_goals = True
-        self.near.put_back()
-        limits, distances = self.near.limits, self.near.distances(self.placed({"vertices": vertices}))
-        if limits is None or not bool((distances > limits).any()):
-            return
-        self.near.lift(vertices)
-        self.distance_for_planarity = self.settings.planar_distance
-        farthest = float(distances[distances > limits].max()) / self.input_edge
-        self.notes.append(
-            f"planar faces take the mesh {farthest:.3g} mean edge lengths from the reference surface, beyond the "
-            f"distance limit{KEEP_LIMIT}"
-        )
 
     def blocks(self, vertices: Tensor) -> dict[str, Tensor]:
         """Variable blocks at ``vertices``; auxiliary variables satisfy their constraints there."""
@@ -317,8 +262,8 @@ class FairProblem:
         where handles have been.
         """
         kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
-        if kept and self.most_warped < math.inf:
-            kept = self.largest_warp(trial["vertices"]) <= self.most_warped
+        if kept and self.planarity.most_warped < math.inf:
+            kept = self.planarity.largest_warp(trial["vertices"]) <= self.planarity.most_warped
         rises = self.has_other_goals or self.near.is_on_the_way_back
         return kept and (rises or self.guard.keeps_energy(state, trial))
 
