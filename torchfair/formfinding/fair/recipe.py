@@ -242,6 +242,22 @@ def minimise_normal_variation(
         True
         >>> result.holds
         True
+
+        Ribs of a roof, the edges more along x than along y, are drawn into planes across y:
+
+        >>> import torch
+        >>> from torchfair.formfinding import FairSettings
+        >>> from torchfair.shapes import FreeFormPatch, parameter_quads
+        >>> roof = parameter_quads(FreeFormPatch(), 8, 8)
+        >>> def in_planes(middles, vectors):
+        ...     is_rib = vectors[:, :1].abs() > vectors[:, 1:2].abs()
+        ...     return torch.where(is_rib, vectors * torch.tensor([1.0, 0.0, 1.0]), 0.0)
+        >>> settings = FairSettings(directions="keep", direction_weight=300.0)
+        >>> made = minimise_normal_variation(roof.vertices, roof.topology, directions_at=in_planes, settings=settings)
+        >>> ends = made.vertices[roof.topology.interior_edges]
+        >>> along, across, _ = (ends[:, 1] - ends[:, 0]).abs().unbind(1)
+        >>> bool((across / along)[along > across].mean() < 0.005)
+        True
     """
     chosen = list(fixed)
     if directions_at is not None and (settings or FairSettings()).directions != "keep":
