@@ -12,6 +12,7 @@ from ...geometry import corner_angles, face_area_vectors
 from ...geometry._ops import dot, norm
 from ...projection.layout import State
 from ...topology import Topology
+from .crossing_sides import crossing_sides
 from .short_sides import ShortSides
 
 _UPRIGHT = 1e-9  # cosine of a face with itself at the start: on the edge, rounding decides what is measured
@@ -57,7 +58,9 @@ class FairGuard:
         self._known: list[tuple[Tensor, _Mesh]] = []
 
     def keeps_faces(self, state: State, trial: State) -> bool:
-        """Whether no face turns over."""
+        """Whether no face turns over, nor has sides that cross where they did not."""
+        if not self._may_turn and bool((self._mesh(trial).crossing & ~self._mesh(state).crossing).any()):
+            return False
         start, after = self._start.area_vectors, self._mesh(trial).area_vectors
         upright = dot(start, after) > self._upright * norm(after)
         if not self._from_last:
@@ -108,6 +111,10 @@ class _Mesh:
     @cached_property
     def area_vectors(self) -> Tensor:
         return face_area_vectors(self.vertices, self._topology)
+
+    @cached_property
+    def crossing(self) -> Tensor:
+        return crossing_sides(self.vertices, self._topology)
 
     @cached_property
     def energy(self) -> float:
