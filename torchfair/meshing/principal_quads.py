@@ -31,7 +31,8 @@ def principal_quads(
     """A quad mesh of a surface whose edges follow its principal curvature lines.
 
     Its vertices lie on a smooth surface through those given. Inside all faces are quads, which meet in fours but for
-    the singular points of the principal directions; at the boundary cells are clipped to polygons. Euler number,
+    the singular points of the principal directions; at the boundary cells are clipped to polygons, and where their
+    short edges collapse, neighbours that touch it in a vertex, or nearly, are triangles or pentagons. Euler number,
     boundary loops, components and orientation are those of the surface. Components are meshed one by one with the same
     spacing.
 
