@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
-
 import torch
 from torch import Tensor
 
 from ...geometry import face_area_vectors
-from ...geometry._ops import cross, dot
+from ...geometry._ops import cross
 from ...topology import Topology
+
+_PAIRS = 1 << 20  # of sides that are looked at together
 
 
 def crossing_sides(vertices: Tensor, topology: Topology) -> Tensor:
@@ -26,16 +26,20 @@ def crossing_sides(vertices: Tensor, topology: Topology) -> Tensor:
     normals = face_area_vectors(vertices, topology)
     for faces, corners in topology.faces_by_size.values():
         size = corners.shape[1]
-        if size == 3:
-            continue
-        at, along = vertices[corners], normals[faces]
-        ahead = at.roll(-1, 1) - at
-        apart = {}  # whether the ends of side j lie on different sides of the line through side i
-        pairs = [(i, j) for i, j in itertools.combinations(range(size), 2) if j - i not in {1, size - 1}]
-        for i, j in pairs + [(j, i) for i, j in pairs]:
-            across = cross(along, ahead[:, i])
-            first, second = (dot(across, at[:, end % size] - at[:, i]) for end in (j, j + 1))
-            apart[i, j] = first * second < 0.0
-        for i, j in pairs:
-            crossing[faces] |= apart[i, j] & apart[j, i]
+        if size > 3:
+            parts = (corners.split(_PAIRS // size**2 + 1), faces.split(_PAIRS // size**2 + 1))
+            for of, some in zip(*parts, strict=True):
+                crossing[some] = _crossing(vertices[of], normals[some])
     return crossing
+
+
+def _crossing(corners: Tensor, normals: Tensor) -> Tensor:
+    """(n,) of polygons (n, size, 3) that are seen along normals (n, 3)."""
+    corners = corners - corners[:, :1]
+    across = cross(normals[:, None], corners.roll(-1, 1) - corners)
+    left = across @ corners.mT
+    left = left - left.diagonal(dim1=1, dim2=2)[..., None]  # [i, j]: how far corner j lies to the left of side i
+    following = left.roll(-1, 2)
+    following.diagonal(dim1=1, dim2=2).zero_()
+    apart = left * following < 0.0  # [i, j]: the ends of side j lie on different sides of the line through side i
+    return (apart & apart.mT).any(2).any(1)
