@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from torchfair._half_edges import sort_keys
+from torchfair._sorted_keys import sort_keys
 
 
 @given(

@@ -10,20 +10,18 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-import torch
+import numpy.typing as npt
 
 from . import _face_hints
 from ._names import Ints as Ints
 from ._names import PlacedError, few, few_groups
 from ._names import first_few as first_few
-from ._tables import outside_of_transforms
 from .errors import MeshError
 
 _FEW_CORNERS = 6
-_RADIX = 32768  # as many numbers as torch sorts by their digits
-_WORD = 64  # bits
 _MOST_VERTICES = 2**31  # keeps the products below in 64 bits and a stray huge index from eating the memory
 
 
@@ -67,47 +65,34 @@ class HalfEdges:
         """Vertex each half-edge points to."""
         if not self.size:
             return self.corners[self.next]
-        table = self.corners.reshape(-1, self.size)
-        return np.concatenate([table[:, 1:], table[:, :1]], axis=1).reshape(-1)
+        return _rolled(self.corners, self.size)
+
+    def heads_of(self, part: slice) -> Ints:
+        """Those of a run of half-edges, which begins and ends with a face where all have as many corners."""
+        return _rolled(self.corners[part], self.size) if self.size else self.heads[part]
+
+    def of_previous(self, values: Ints, kind: type[np.signedinteger[Any]]) -> npt.NDArray[Any]:
+        """What the corner before each one has among the ``values`` of corners, as integers of some kind."""
+        if not self.size:
+            return values[self.previous].astype(kind, copy=False)
+        table, found = values.reshape(-1, self.size), np.empty((len(self.offsets) - 1, self.size), kind)
+        found[:, 0], found[:, 1:] = table[:, -1], table[:, :-1]
+        return found.reshape(-1)
+
+    def faces_at(self, places: Ints) -> Ints:
+        """Face of some corners."""
+        return places // self.size if self.size else self.faces[places]
+
+
+def _rolled(corners: Ints, size: int) -> Ints:
+    """The corner behind each one, in faces of as many corners."""
+    table = corners.reshape(-1, size)
+    return np.concatenate([table[:, 1:], table[:, :1]], axis=1).reshape(-1)
 
 
 def face_of_corner(offsets: Ints) -> Ints:
     """Face of each corner."""
     return np.repeat(np.arange(offsets.size - 1, dtype=np.int64), np.diff(offsets))
-
-
-def edge_keys(tails: Ints, heads: Ints, count: int) -> Ints:
-    """One number for each edge among ``count`` vertices, whichever way it is traversed."""
-    keys: Ints = np.minimum(tails, heads) * np.int64(max(count, 1)) + np.maximum(tails, heads)
-    return keys
-
-
-def groups_of(keys: Ints) -> tuple[Ints, Ints, Ints]:
-    """Equal keys as ``(order, starts, counts)``: group i is ``order[starts[i] : starts[i] + counts[i]]``."""
-    order, ordered = sort_keys(keys)
-    starts = np.flatnonzero(np.diff(ordered, prepend=-1))
-    return order, starts, np.diff(np.append(starts, keys.size))
-
-
-def sort_keys(keys: Ints) -> tuple[Ints, Ints]:
-    """The stable order of numbers that are at least 0, and the numbers in that order.
-
-    Where a number and its place fit into one word, words are sorted, without an order beside them: 5 times as fast.
-    """
-    shift = max(keys.size - 1, 0).bit_length()
-    if int(keys.max(initial=0)).bit_length() + shift <= _WORD:
-        words = np.left_shift(keys, shift, dtype=np.uint64, casting="unsafe")
-        words |= np.arange(keys.size, dtype=np.uint64)
-        words.sort()
-        order = (words & np.uint64((1 << shift) - 1)).view(np.int64)
-        words >>= np.uint64(shift)
-        return order, words.view(np.int64)
-    if keys.size < _RADIX:
-        order = np.argsort(keys, kind="stable")
-        return order, keys[order]
-    with outside_of_transforms():  # torch sorts many integers digit by digit, three times as fast
-        ordered, places = torch.sort(torch.from_numpy(keys), stable=True)
-        return places.numpy(), ordered.numpy()
 
 
 def pack_faces(faces: object) -> tuple[Ints, Ints]:

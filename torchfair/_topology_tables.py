@@ -66,6 +66,10 @@ class MeshTables(JoinedTables):
     def next_corners(self) -> Tensor:
         """(H,) the next corner of the same face, counterclockwise."""
         following = torch.arange(1, self.corners.shape[0] + 1, device=self.device)
+        if len(self.faces_by_size) == 1:
+            (size,) = self.faces_by_size
+            following.view(-1, size)[:, -1].sub_(size)
+            return following
         following[self.face_offsets[1:] - 1] = self.face_offsets[:-1]
         return following
 
@@ -101,7 +105,7 @@ class MeshTables(JoinedTables):
     def valences(self) -> Tensor:
         """(V,) number of edges at each vertex; 0 for isolated vertices."""
         ends = self.edges.reshape(-1)
-        return ends.new_zeros(self.num_vertices).index_add_(0, ends, torch.ones_like(ends))
+        return ends.new_zeros(self.num_vertices).index_add_(0, ends, ends.new_ones(()).expand_as(ends))
 
     @cached_table
     def is_boundary_vertex(self) -> Tensor:

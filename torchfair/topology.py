@@ -104,7 +104,18 @@ class Topology(MeshTables):
         """Like :meth:`from_faces`, from numpy arrays (copied) as in attributes ``corners`` and ``face_offsets``."""
         if manifold not in get_args(Manifold):
             raise MeshError(f'manifold must be "vertices" or "edges", got {manifold!r}')
-        half = _connectivity.build_half_edges(corners.copy(), face_offsets.copy(), num_vertices)
+        return cls._of_own_faces(corners.copy(), face_offsets.copy(), num_vertices, manifold)
+
+    @classmethod
+    def _of_own_faces(
+        cls,
+        corners: _connectivity.Ints,
+        face_offsets: _connectivity.Ints,
+        num_vertices: int | None,
+        manifold: Manifold = "vertices",
+    ) -> Topology:
+        """Like :meth:`from_packed_faces`, of arrays that nobody else writes to."""
+        half = _connectivity.build_half_edges(corners, face_offsets, num_vertices)
         edges = _connectivity.build_edges(half)
         arrays = {
             "corners": half.corners,

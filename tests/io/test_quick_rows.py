@@ -143,6 +143,11 @@ def test_digits_are_rounded_as_python_does(values: list[float], digits: int) -> 
 @example(["1.2e3.4", "1"], " ")
 @example(["1e2e3", "1", "1"], "\n")
 @example(["1.2.3", "1", "1"], "\n")
+@example(["1.5e3", "-2.5", ".5e-1"], " ")
+@example(["1e2.5", "3.5"], " ")
+@example(["1.5e2e3", "3.5"], " ")
+@example(["1.5", "2e3.5", "3.5e1"], "\n")
+@example(["1.5e1", "2", "3.5e1"], "\n")
 def test_words_are_what_python_takes_for_numbers(words: list[str], blank: str) -> None:
     """Or at least none of them is anything else."""
     (text,) = portions(blank.join(words).encode("latin1") + b"\n")
@@ -184,9 +189,12 @@ ROWS = b"0 0 0\n1 0 0\n1 1 0.1\n0 1 1e-3\n"
 
 
 @pytest.mark.parametrize("size", [1 << 20, 1, 9])
-@pytest.mark.parametrize("faces", [b"4 0 1 2 3\n3 0 1 2", b"3 0 1 2\r\n4 3 2 1 0\r\n"])
+@pytest.mark.parametrize(
+    "faces",
+    [b"4 0 1 2 3\n3 0 1 2", b"3 0 1 2\r\n4 3 2 1 0\r\n", b"4 0 1 2 3\n3 0 1 2\n5 0 1 2 3 0\n", b"3 0 1 2 \n" * 9],
+)
 def test_text_of_ply_goes_the_quick_way(size: int, faces: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    data = ply_text(ROWS, faces, (4, 2))
+    data = ply_text(ROWS, faces, (4, len(faces.splitlines())))
     header = read_header(PATH, data)
     wanted = {"vertex": [2, 0], "face": [0]}
     text = split_words(data[header.body_start :], header.num_lines + 1)

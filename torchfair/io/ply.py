@@ -43,9 +43,9 @@ def read_ply(path: Path, data: bytes) -> RawMesh:
     else:
         columns, lines, more = _read_text(path, data, header, wanted)
         origin = Origin(path, lines["vertex"], lines[faces])
-    points = np.stack([values for values, _ in columns["vertex"]], axis=1).astype(np.float64)
+    points = np.stack([values for values, _ in columns["vertex"]], axis=1).astype(np.float64, copy=False)
     corners, sizes = columns[faces][0]
-    corners = corners.astype(np.int64)
+    corners = corners.astype(np.int64, copy=False)
     if faces == _STRIPS:
         corners, sizes, strips = _cut_strips(corners, sizes)
         if origin.face_lines is not None:

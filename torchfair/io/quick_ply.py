@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from .gathered import Gathered
 from .ply_header import Element, Header
 from .ply_rows import Column
 from .quick_rows import Portion, float_rows, int_rows, is_usual, portions
-from .raw_mesh import Ints
+from .raw_mesh import Floats, Ints
+
+_NO_SIZES = np.zeros(0, np.int64)
 
 
 def quick_body(
@@ -20,11 +25,10 @@ def quick_body(
     Unusual are elements without rows, blank lines, more or fewer lines than the header promises, lists beside other
     properties, and numbers that are no plain decimal ones.
     """
-    names = {element.name for element in header.elements if element.count and element.properties}
-    if not is_usual(data) or len(names) < len(header.elements):
-        return None
     elements = header.elements
-    parts: dict[str, list[list[Column]]] = {element.name: [] for element in header.elements}
+    if not is_usual(data) or not all(0 < element.count < len(data) and element.properties for element in elements):
+        return None
+    parts = {element.name: (Gathered(), Gathered()) for element in elements}
     place, done = 0, 0  # element, and its rows so far
     for text in portions(data, header.body_start):
         begin = 0
@@ -36,14 +40,25 @@ def quick_body(
             rows = _rows(_between(text, begin, end), element, wanted.get(element.name, ()))
             if rows is None:
                 return None
-            parts[element.name].append(rows)
+            for gathered, part in zip(parts[element.name], rows, strict=True):
+                gathered.add(part, element.count * len(part) / (end - begin))
             done += end - begin
             begin = end
             if done == element.count:
                 place, done = place + 1, 0
     if place < len(elements):
         return None
-    return {name: _joined(rows) for name, rows in parts.items()}, _lines(header)
+    columns = {
+        element.name: _columns(element, parts[element.name][0].rows, parts[element.name][1].rows)
+        for element in elements
+    }
+    return columns, _lines(header)
+
+
+def _columns(element: Element, values: npt.NDArray[Any], sizes: Ints) -> list[Column]:
+    if _is_plain(element):
+        return [(column, np.broadcast_to(np.int64(1), len(column))) for column in values.T]
+    return [(values, sizes)]
 
 
 def _lines(header: Header) -> dict[str, Ints]:
@@ -55,25 +70,23 @@ def _lines(header: Header) -> dict[str, Ints]:
     }
 
 
-def _joined(rows: list[list[Column]]) -> list[Column]:
-    """Columns of an element of the rows of several portions."""
-    columns = [zip(*column, strict=True) for column in zip(*rows, strict=True)]
-    return [(np.concatenate(next(column)), np.concatenate(next(column))) for column in columns]
-
-
 def _between(text: Portion, first: int, last: int) -> Portion:
     start, end = int(text.begins[first]), int(text.ends[last - 1]) + 1
-    return Portion(text.codes[start:end], text.begins[first:last] - start, text.ends[first:last] - start)
+    return Portion(text.codes[start:end], text.begins[first:last] - start, text.ends[first:last] - start, text.total)
 
 
-def _rows(text: Portion, element: Element, wanted: Sequence[int]) -> list[Column] | None:
-    properties = element.properties
-    if not any(item.count_type for item in properties):
+def _rows(text: Portion, element: Element, wanted: Sequence[int]) -> tuple[npt.NDArray[Any], Ints] | None:
+    """The ``wanted`` values of some rows: (n, k) of numbers, or those of one list a row and their (n,) counts."""
+    if _is_plain(element):
         return _plain_rows(text, element, wanted)
-    return _lists(text) if len(properties) == 1 and list(wanted) == [0] else None
+    return _lists(text) if len(element.properties) == 1 and list(wanted) == [0] else None
 
 
-def _plain_rows(text: Portion, element: Element, wanted: Sequence[int]) -> list[Column] | None:
+def _is_plain(element: Element) -> bool:
+    return not any(item.count_type for item in element.properties)
+
+
+def _plain_rows(text: Portion, element: Element, wanted: Sequence[int]) -> tuple[Floats, Ints] | None:
     """Rows without lists."""
     rows = float_rows(text)
     if rows is None or not all("f" in element.properties[i].type for i in wanted):
@@ -81,11 +94,10 @@ def _plain_rows(text: Portion, element: Element, wanted: Sequence[int]) -> list[
     values, sizes = rows
     if (sizes != len(element.properties)).any():
         return None
-    table = values.reshape(sizes.size, -1)
-    return [(table[:, i], np.ones_like(sizes)) for i in wanted]
+    return values.reshape(sizes.size, -1)[:, list(wanted)], _NO_SIZES
 
 
-def _lists(text: Portion) -> list[Column] | None:
+def _lists(text: Portion) -> tuple[Ints, Ints] | None:
     """Rows that are one list of whole numbers."""
     rows = int_rows(text)
     if rows is None or not rows[1].all():
@@ -94,4 +106,6 @@ def _lists(text: Portion) -> list[Column] | None:
     first = np.cumsum(sizes) - sizes
     if (values[first] != sizes - 1).any():
         return None
-    return [(np.delete(values, first), sizes - 1)]
+    if (sizes == sizes[0]).all():
+        return values.reshape(sizes.size, -1)[:, 1:].reshape(-1), sizes - 1
+    return np.delete(values, first), sizes - 1

@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .decimals import BLANKS, DIGITS, Codes, Mask, decimals
+from .decimals import BLANKS, DIGITS, Codes, Mask, decimals, has_plain_blanks
 from .raw_mesh import Floats, Ints
+from .short_numbers import short_numbers
 
-PORTION = 1 << 22
+PORTION = 1 << 20
 """Bytes that are looked at together: few enough for the cache and the memory, enough for little overhead."""
 _SPACE, _NEWLINE = 32, 10
 _INT = DIGITS + b"+-" + BLANKS
@@ -30,11 +31,13 @@ class Portion(NamedTuple):
         codes: The bytes; the last is the end of a line.
         begins: First byte of each line.
         ends: The newline of each line.
+        total: Bytes of the whole text.
     """
 
     codes: Codes
     begins: Ints
     ends: Ints
+    total: int
 
     def lines(self, chosen: Mask) -> Portion:
         """Some of the lines."""
@@ -43,7 +46,7 @@ class Portion(NamedTuple):
         sizes = self.ends + 1 - self.begins
         ends = np.cumsum(sizes[chosen]) - 1
         begins = np.append(0, ends[:-1] + 1)[: ends.size]
-        return Portion(self.codes[np.repeat(chosen, sizes)], begins, ends)
+        return Portion(self.codes[np.repeat(chosen, sizes)], begins, ends, self.total)
 
 
 def is_usual(data: bytes) -> bool:
@@ -53,46 +56,61 @@ def is_usual(data: bytes) -> bool:
 
 def portions(data: bytes, start: int = 0) -> Iterator[Portion]:
     """All lines of ``data`` from the byte ``start`` on, some at a time; a last one without an end is given one."""
+    total = len(data) - start
+    np.empty(
+        8 * min(PORTION, total), np.uint8
+    )  # freed: only now the C library keeps pieces up to that size for the next portion
     while start < len(data):
         end = data.find(b"\n", min(start + PORTION, len(data)) - 1) + 1 or len(data)
         piece = data[start:end]
         codes = np.frombuffer(piece if piece.endswith(b"\n") else piece + b"\n", np.uint8)
         ends = np.flatnonzero(codes == _NEWLINE)
-        yield Portion(codes, np.append(0, ends[:-1] + 1), ends)
+        yield Portion(codes, np.append(0, ends[:-1] + 1), ends, total)
         start = end
 
 
 def float_rows(text: Portion) -> tuple[Floats, Ints] | None:
     """Numbers of a text, and how many stand on each line; None if a word is no plain decimal number."""
-    starts, sizes = _word_starts(text)
-    values = decimals(text.codes, starts)
+    starts, ends, sizes = _words(text)
+    values = decimals(text.codes, starts, ends, text.total)
     return None if values is None else (values, sizes)
 
 
 def int_rows(text: Portion) -> tuple[Ints, Ints] | None:
     """Whole numbers of a text, and how many stand on each line; None if a word is none, or has many digits."""
-    starts, sizes = _word_starts(text)
+    starts, ends, sizes = _words(text)
+    values = short_numbers(text.codes, starts, ends) if has_plain_blanks(text.codes) else None
+    if values is None:
+        values = _long_numbers(text, starts)
+    return None if values is None else (values, sizes)
+
+
+def _words(text: Portion) -> tuple[Ints, Ints, Ints]:
+    """First byte of each word, the blank behind it, and number of words on each line."""
+    ends = np.flatnonzero(text.codes <= _SPACE)
+    starts = np.empty_like(ends)
+    starts[:1], starts[1:] = 0, ends[:-1]
+    starts[1:] += 1
+    filled = starts < ends
+    if not filled.all():  # some blanks stand behind others
+        starts, ends = starts[filled], ends[filled]
+    rows = text.begins.size
+    if rows and starts.size and starts.size % rows == 0:
+        firsts, lasts = starts.reshape(rows, -1)[:, 0], ends.reshape(rows, -1)[:, -1]
+        if (firsts >= text.begins).all() and (lasts <= text.ends).all():  # the usual case: as many on every line
+            return starts, ends, np.full(rows, starts.size // rows)
+    return starts, ends, np.diff(np.searchsorted(starts, text.ends), prepend=0)
+
+
+def _long_numbers(text: Portion, starts: Ints) -> Ints | None:
+    """Whole numbers that may have signs and up to 18 digits; None if there is anything else."""
     if starts.size and np.diff(starts, append=text.codes.size).max() > _MOST_DIGITS:
         return None  # blanks between words count, too: such a text is unusual enough
     signs = np.flatnonzero((text.codes == _MINUS) | (text.codes == _PLUS))
     if (text.codes[signs + 1] < _ZERO).any():  # a newline is behind the last one
         return None  # numpy reads a lone sign as a zero
     values = _whole_numbers(text.codes.tobytes()) if starts.size else np.zeros(0, np.int64)
-    return None if values is None or values.size != starts.size else (values, sizes)
-
-
-def _word_starts(text: Portion) -> tuple[Ints, Ints]:
-    """First byte of each word, and number of words on each line."""
-    blank = text.codes <= _SPACE
-    is_start = ~blank
-    is_start[1:] &= blank[:-1]
-    starts = np.flatnonzero(is_start)
-    rows = text.begins.size
-    if rows and starts.size and starts.size % rows == 0:
-        table = starts.reshape(rows, -1)  # the usual case: as many on every line
-        if (table[:, 0] >= text.begins).all() and (table[:, -1] < text.ends).all():
-            return starts, np.full(rows, table.shape[1])
-    return starts, np.diff(np.searchsorted(starts, text.ends), prepend=0)
+    return None if values is None or values.size != starts.size else values
 
 
 def _whole_numbers(data: bytes) -> Ints | None:
@@ -139,7 +157,7 @@ def split_at_slashes(text: Portion) -> Parted | None:
     slashes = np.flatnonzero(text.codes == ord("/"))
     if not slashes.size:
         return Parted(text, 1, False, 0)
-    starts, _ = _word_starts(text)
+    starts, _, _ = _words(text)
     each = slashes.size // max(starts.size, 1)
     if each not in (1, 2) or slashes.size != each * starts.size:
         return None

@@ -54,18 +54,19 @@ def assemble(origin: Origin, points: Floats, corners: Ints, sizes: Ints) -> RawM
     for count, name in ((len(points), "vertices"), (len(sizes), "faces")):
         if not count:
             raise MeshFileError(origin.path, f"the mesh has no {name}")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if bad.size:
+    if not np.isfinite(points).all():
+        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         values = ", ".join(map(repr, points[bad[0]].tolist()))
         fault = f"vertex {bad[0] + origin.first_index} has coordinates that are not finite numbers: {values}"
         raise MeshFileError(origin.path, fault, _line(origin.vertex_lines, bad[0]))
-    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    offsets = np.zeros(len(sizes) + 1, np.int64)
+    np.cumsum(sizes, out=offsets[1:])
     small = np.flatnonzero(sizes < 3)
     if small.size:
         fault = f"face {small[0] + origin.first_index} has {sizes[small[0]]} corner(s); a face needs three or more"
         raise MeshFileError(origin.path, fault, _line(origin.face_lines, small[0]))
-    outside = np.flatnonzero((corners < 0) | (corners >= len(points)))
-    if outside.size:
+    if corners.min() < 0 or corners.max() >= len(points):
+        outside = np.flatnonzero((corners < 0) | (corners >= len(points)))
         face = int(np.searchsorted(offsets, outside[0], side="right")) - 1
         first = origin.first_index
         fault = (

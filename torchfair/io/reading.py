@@ -20,7 +20,7 @@ from .obj import read_obj
 from .off import read_off
 from .ply import read_ply
 from .polygon_mesh import PolygonMesh
-from .raw_mesh import RawMesh
+from .raw_mesh import Ints, RawMesh
 from .rhino import read_rhino
 from .rhino_surfaces import Cells, checked_cells
 from .stl import read_stl
@@ -90,17 +90,17 @@ def load_mesh(
 
 def _made(raw: RawMesh, repair: bool, weld: bool | float, split_edges: bool) -> PolygonMesh:
     vertices = torch.from_numpy(raw.points)
-    faces = raw.corners, raw.offsets
     as_it_comes = not repair and weld is False
     weld = True if raw.split and weld is False else weld
     if not repair and weld is False:
-        mesh = PolygonMesh(vertices, Topology.from_packed_faces(*faces, len(raw.points)), (), raw.notes, raw.names)
+        topology = Topology._of_own_faces(_writable(raw.corners), _writable(raw.offsets), len(raw.points))
+        mesh = PolygonMesh(vertices, topology, (), raw.notes, raw.names)
         mesh = replace(mesh, attributes=raw.attributes)
     else:
         if repair:
-            mended = repair_packed(vertices, *faces, weld=weld, split_edges=split_edges)
+            mended = repair_packed(vertices, raw.corners, raw.offsets, weld=weld, split_edges=split_edges)
         else:
-            mended = weld_packed(vertices, *faces, weld)
+            mended = weld_packed(vertices, raw.corners, raw.offsets, weld)
         kept = [part.numpy() for part in (mended.kept_vertices, mended.kept_faces, mended.kept_corners)]
         same = len(kept[0]) == len(raw.points) and bool((kept[0] == np.arange(len(kept[0]))).all())
         done = tuple(sentence.told(raw.names) for sentence in mended.sentences)
@@ -120,6 +120,10 @@ def _made(raw: RawMesh, repair: bool, weld: bool | float, split_edges: bool) -> 
         told.append(seams.told(mesh.names) + hint)
     told += _mostly_open(mesh.topology, seams is None)
     return replace(mesh, notes=(*mesh.notes, *told))
+
+
+def _writable(numbers: Ints) -> Ints:
+    return numbers if numbers.flags.writeable else numbers.copy()
 
 
 def _mostly_open(topology: Topology, apart: bool) -> list[str]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._half_edges import edge_keys, groups_of
 from .._names import Ints, few, few_groups
+from .._sorted_keys import edge_keys, groups_of
 from .soup import Bools, Soup
 
 

@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 
-from .._half_edges import edge_keys, groups_of
 from .._names import Ints
+from .._sorted_keys import edge_keys, groups_of
 from .soup import Floats, Soup
 
 _TIE = 1e-6  # radians

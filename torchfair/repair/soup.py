@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from .._half_edges import edge_keys, groups_of
 from .._names import Ints, Part, PlacedError, Sentence, few, sentence
+from .._sorted_keys import edge_keys, groups_of
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._half_edges import edge_keys
 from .._names import few
+from .._sorted_keys import edge_keys
 from .soup import Soup
 from .welding import rim_places
 
