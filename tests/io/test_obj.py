@@ -131,6 +131,11 @@ def test_byte_order_mark_and_foreign_letters(tmp_path: Path) -> None:
     assert load(tmp_path, text)[1] == [[0, 1, 2, 3]]
 
 
+def test_a_byte_order_mark_alone_is_no_mesh(tmp_path: Path) -> None:
+    with pytest.raises(MeshFileError, match="no vertices"):
+        load(tmp_path, b"\xef\xbb\xbf")
+
+
 def test_continued_lines(tmp_path: Path) -> None:
     text = "v 0 \\\n0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nl 1 2 \\\n3\nf 1 2 \\ \n 3 \\\n4\nf 1 2 x"
     with pytest.raises(MeshFileError, match="'x'") as caught:

@@ -55,11 +55,12 @@ class QuickObj(NamedTuple):
 
 
 def quick_statements(data: bytes) -> QuickObj | None:
-    """The statements of a file; None if any of it is unusual, such as a vertex of more than three numbers."""
-    if not is_usual(data) or b"\x1a" in data or (b"\\" in data and _CONTINUED.search(data)):
+    """The statements of a file; None if any of it is unusual, such as a vertex of more than three numbers, or nothing."""
+    data = data.removeprefix(_BYTE_ORDER_MARK)
+    if not data or not is_usual(data) or b"\x1a" in data or (b"\\" in data and _CONTINUED.search(data)):
         return None
     pieces, first_line = [], 1
-    for text in portions(data.removeprefix(_BYTE_ORDER_MARK)):
+    for text in portions(data):
         piece = _statements(text, first_line)
         if piece is None:
             return None
