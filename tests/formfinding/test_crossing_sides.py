@@ -11,6 +11,7 @@ from torch import Tensor
 
 from torchfair import Topology
 from torchfair.formfinding import FairSettings
+from torchfair.formfinding.fair import crossing_sides as module
 from torchfair.formfinding.fair.crossing_sides import crossing_sides
 from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.formfinding.job.pulls import Pulls
@@ -55,6 +56,19 @@ def test_sides_that_touch_do_not_cross_and_triangles_have_none() -> None:
     touching = polygon([[0, 0], [2, 0], [2, 1], [1, 0], [0, 1]])
     assert crossing_sides(touching, PENTAGON).tolist() == [False]
     assert crossing_sides(touching, Topology.from_faces([[0, 1, 2], [0, 2, 4]], 5)).tolist() == [False, False]
+
+
+@pytest.mark.parametrize("pairs", [1, 60, 1 << 20])
+def test_many_polygons_at_once_are_as_each_alone(monkeypatch: pytest.MonkeyPatch, pairs: int) -> None:
+    monkeypatch.setattr(module, "_PAIRS", pairs)
+    generator = torch.Generator().manual_seed(5)
+    sizes = torch.randint(3, 8, (60,), generator=generator).tolist()
+    corners = torch.randn(sum(sizes), 3, dtype=torch.float64, generator=generator)
+    parts = corners.split(sizes)
+    faces = [list(part) for part in torch.arange(len(corners)).split(sizes)]
+    alone = [bool(crossing_sides(part, Topology.from_faces([list(range(len(part)))]))) for part in parts]
+    assert crossing_sides(corners, Topology.from_faces([[int(v) for v in face] for face in faces])).tolist() == alone
+    assert 10 < sum(alone) < 50
 
 
 def test_a_step_after_which_sides_cross_is_refused() -> None:

@@ -55,7 +55,7 @@ class QuickObj(NamedTuple):
 
 
 def quick_statements(data: bytes) -> QuickObj | None:
-    """The statements of a file; None if any of it is unusual, such as a vertex of more than three numbers, or nothing."""
+    """The statements of a file; None if there are none or one is unusual, as a vertex of more than three numbers."""
     data = data.removeprefix(_BYTE_ORDER_MARK)
     if not data or not is_usual(data) or b"\x1a" in data or (b"\\" in data and _CONTINUED.search(data)):
         return None

@@ -27,7 +27,7 @@ def crossing_sides(vertices: Tensor, topology: Topology) -> Tensor:
     for faces, corners in topology.faces_by_size.values():
         size = corners.shape[1]
         if size > 3:
-            parts = (corners.split(_PAIRS // size**2 + 1), faces.split(_PAIRS // size**2 + 1))
+            parts = (torch.split(part, _PAIRS // size**2 + 1) for part in (corners, faces))
             for of, some in zip(*parts, strict=True):
                 crossing[some] = _crossing(vertices[of], normals[some])
     return crossing
@@ -39,7 +39,5 @@ def _crossing(corners: Tensor, normals: Tensor) -> Tensor:
     across = cross(normals[:, None], corners.roll(-1, 1) - corners)
     left = across @ corners.mT
     left = left - left.diagonal(dim1=1, dim2=2)[..., None]  # [i, j]: how far corner j lies to the left of side i
-    following = left.roll(-1, 2)
-    following.diagonal(dim1=1, dim2=2).zero_()
-    apart = left * following < 0.0  # [i, j]: the ends of side j lie on different sides of the line through side i
+    apart = left * left.roll(-1, 2) < 0.0  # [i, j]: the ends of side j lie on both sides of the line through side i
     return (apart & apart.mT).any(2).any(1)
