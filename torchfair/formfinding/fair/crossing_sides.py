@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from ...geometry import face_area_vectors
-from ...geometry._ops import cross
+from ...geometry._polygon_sides import sides_cross
 from ...topology import Topology
 
 _PAIRS = 1 << 20  # of sides that are looked at together
@@ -22,22 +22,12 @@ def crossing_sides(vertices: Tensor, topology: Topology) -> Tensor:
         vertices: (V, 3) positions, any length unit.
         topology: connectivity; any polygons.
     """
-    crossing = torch.zeros(topology.num_faces, dtype=torch.bool, device=vertices.device)
-    normals = face_area_vectors(vertices, topology)
-    for faces, corners in topology.faces_by_size.values():
-        size = corners.shape[1]
-        if size > 3:
-            parts = (torch.split(part, _PAIRS // size**2 + 1) for part in (corners, faces))
-            for of, some in zip(*parts, strict=True):
-                crossing[some] = _crossing(vertices[of], normals[some])
-    return crossing
-
-
-def _crossing(corners: Tensor, normals: Tensor) -> Tensor:
-    """(n,) of polygons (n, size, 3) that are seen along normals (n, 3)."""
-    corners = corners - corners[:, :1]
-    across = cross(normals[:, None], corners.roll(-1, 1) - corners)
-    left = across @ corners.mT
-    left = left - left.diagonal(dim1=1, dim2=2)[..., None]  # [i, j]: how far corner j lies to the left of side i
-    apart = left * left.roll(-1, 2) < 0.0  # [i, j]: the ends of side j lie on both sides of the line through side i
-    return (apart & apart.mT).any(2).any(1)
+    crossing = torch.zeros(topology.num_faces, dtype=torch.bool)
+    places, normals = (part.detach().cpu() for part in (vertices, face_area_vectors(vertices, topology)))
+    for size, parts in topology.faces_by_size.items():
+        if size == 3:
+            continue
+        faces, corners = (torch.split(part.cpu(), _PAIRS // size**2 + 1) for part in parts)
+        for some, of in zip(faces, corners, strict=True):
+            crossing[some] = torch.from_numpy(sides_cross(places[of].numpy(), normals[some].numpy()))
+    return crossing.to(vertices.device)
