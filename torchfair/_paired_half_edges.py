@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ._half_edges import HalfEdges, Ints
+from ._sorted_keys import WORD
 
 Words = npt.NDArray[np.uint64]
 
 _BLOCK = 1 << 15  # half-edges that are looked at together: few enough for the cache
-_WORD = 64  # bits
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def paired_edges(half: HalfEdges) -> Edges | None:
     half-edges that follow each other in their order and differ in direction only the first has the left face.
     """
     places = max(half.corners.size - 1, 0).bit_length()
-    if (max(half.num_vertices, 1) ** 2 - 1).bit_length() + 1 + places > _WORD:
+    if (max(half.num_vertices, 1) ** 2 - 1).bit_length() + 1 + places > WORD:
         return None
     words = _words(half, places)
     words.sort()

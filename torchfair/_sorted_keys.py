@@ -9,7 +9,7 @@ from ._names import Ints
 from ._tables import outside_of_transforms
 
 _RADIX = 32768  # as many numbers as torch sorts by their digits
-_WORD = 64  # bits
+WORD = 64  # bits
 
 
 def edge_keys(tails: Ints, heads: Ints, count: int) -> Ints:
@@ -31,7 +31,7 @@ def sort_keys(keys: Ints) -> tuple[Ints, Ints]:
     Where a number and its place fit into one word, words are sorted, without an order beside them: 5 times as fast.
     """
     shift = max(keys.size - 1, 0).bit_length()
-    if int(keys.max(initial=0)).bit_length() + shift <= _WORD:
+    if int(keys.max(initial=0)).bit_length() + shift <= WORD:
         words = np.left_shift(keys, shift, dtype=np.uint64, casting="unsafe")
         words |= np.arange(keys.size, dtype=np.uint64)
         words.sort()

@@ -57,9 +57,7 @@ def is_usual(data: bytes) -> bool:
 def portions(data: bytes, start: int = 0) -> Iterator[Portion]:
     """All lines of ``data`` from the byte ``start`` on, some at a time; a last one without an end is given one."""
     total = len(data) - start
-    np.empty(
-        8 * min(PORTION, total), np.uint8
-    )  # freed: only now the C library keeps pieces up to that size for the next portion
+    np.empty(8 * min(PORTION, total), np.uint8)  # once that is freed, the C library keeps what portions give back
     while start < len(data):
         end = data.find(b"\n", min(start + PORTION, len(data)) - 1) + 1 or len(data)
         piece = data[start:end]
