@@ -5,16 +5,19 @@ from __future__ import annotations
 import itertools
 import math
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
 from torchfair import Topology
-from torchfair.formfinding import FairSettings
+from torchfair.formfinding import FairRecipe, FairSettings, minimise_normal_variation
 from torchfair.formfinding.fair import crossing_sides as module
+from torchfair.formfinding.fair import planarity_goal
 from torchfair.formfinding.fair.crossing_sides import crossing_sides
 from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.formfinding.job.pulls import Pulls
+from torchfair.geometry._polygon_sides import sides_cross
 
 HOUSE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.55, 1.5], [0.45, 1.5]]  # with a short ridge
 PENTAGON = Topology.from_faces([[0, 1, 2, 3, 4]])
@@ -78,13 +81,73 @@ def test_a_step_after_which_sides_cross_is_refused() -> None:
     states = {"start": {"vertices": start}, "reversed": {"vertices": reversed_}}
     wider = {"vertices": polygon([*HOUSE[:3], [0.6, 1.5], [0.4, 1.5]])}
     assert problem.guard.keeps_bounds(states["reversed"])  # angles, area and lengths are good
-    assert problem.guard.keeps_faces(states["start"], wider)
-    assert not problem.guard.keeps_faces(states["start"], states["reversed"])
-    assert problem.guard.keeps_faces(states["reversed"], states["reversed"])  # what crosses already may
+    assert problem.keeps_faces(states["start"], wider)
+    assert not problem.keeps_faces(states["start"], states["reversed"])
+    assert problem.keeps_faces(states["reversed"], states["reversed"])  # what crosses already may
 
 
 def test_faces_that_may_turn_may_have_sides_that_cross() -> None:
     start = polygon(HOUSE)
     settings = FairSettings(boundary="free", faces_may_turn=True)
     problem = FairProblem(start, PENTAGON, None, Pulls(start), settings)
-    assert problem.guard.keeps_faces({"vertices": start}, {"vertices": polygon(ridge_reversed())})
+    assert problem.keeps_faces({"vertices": start}, {"vertices": polygon(ridge_reversed())})
+
+
+def house_recipe() -> FairRecipe:
+    settings = FairSettings(boundary="free", smallest_area=0.1, smallest_edge=0.0, distance_limit=2.0)
+    return FairRecipe(polygon(HOUSE), PENTAGON, settings=settings)
+
+
+@pytest.mark.parametrize("first", [0, 2, 3])
+@pytest.mark.parametrize("warped", [False, True])
+def test_once_sides_cross_after_a_stage_all_is_done_anew_with_none_that_cross(first: int, warped: bool) -> None:
+    """But where faces could not become planar, E alone is lowered then, as it was."""
+    recipe = house_recipe()
+    begin, crossed = recipe.start, recipe.unit.apply(polygon(ridge_reversed()))
+    notes, planarity = list(recipe.problem.notes), recipe.problem.planarity
+    plan = recipe.plan(recipe.state())
+    allowed, begun = [], []
+    for stage in plan.stages():
+        assert stage.guard is not None
+        allowed.append(stage.guard({"vertices": begin}, {"vertices": crossed}))
+        begun.append(stage.blocks["vertices"])
+        if allowed[-1]:
+            recipe.problem.notes.append("what it cost")
+            planarity.distance, planarity.most_warped = 9.0, 0.1 if warped else math.inf
+        plan.state = {"vertices": crossed if len(allowed) - 1 == first else begin}
+    again = (1 if warped else 3) if first < 3 else 0
+    assert allowed == [True] * min(first + 1, 3) + [False] * again
+    assert torch.equal(plan.state["vertices"], begin)
+    assert not recipe.problem.admits({"vertices": begin}, {"vertices": crossed})
+    if again:
+        assert torch.equal(begun[first + 1], begin)
+        assert recipe.problem.notes == notes
+        assert planarity.distance == 0.0
+
+
+def test_no_start_where_planes_meet_has_sides_that_cross(monkeypatch: pytest.MonkeyPatch) -> None:
+    recipe = house_recipe()
+    wider = [*HOUSE[:3], [0.6, 1.5], [0.4, 1.5]]
+    for corners, fits in ((ridge_reversed(), False), (wider, True)):
+        moved = recipe.unit.apply(polygon(corners))
+        monkeypatch.setattr(planarity_goal, "on_face_planes", lambda *_, moved=moved: moved)
+        found = recipe.problem.planarity.where_planes_meet(recipe.start)
+        assert (found is not None and torch.equal(found, moved)) == fits
+
+
+def test_far_from_the_origin_polygons_of_whole_numbers_cross_where_they_did() -> None:
+    generator = np.random.default_rng(3)
+    corners = np.pad(generator.integers(0, 4, (300, 6, 2)), ((0, 0), (0, 0), (0, 1))).astype(float)
+    up = np.broadcast_to([0.0, 0.0, 1.0], (300, 3))
+    crossing = sides_cross(corners, up)
+    assert 50 < crossing.sum() < 250
+    assert np.array_equal(sides_cross(corners + 2.0**51, up), crossing)
+
+
+def test_faces_whose_sides_cross_are_counted_and_no_more_than_at_the_start_are_promised() -> None:
+    for corners, count in ((HOUSE, 0), (ridge_reversed(), 1)):
+        settings = FairSettings(boundary="fixed", smallest_area=0.1, smallest_edge=0.0)
+        result = minimise_normal_variation(polygon(corners), PENTAGON, settings=settings)
+        assert result.after["crossing_faces"] == count
+        (promise,) = (promise for promise in result.promises if promise.name == "faces that cross themselves")
+        assert (promise.asked, promise.reached, promise.holds) == (count, count, True)

@@ -58,9 +58,7 @@ class FairGuard:
         self._known: list[tuple[Tensor, _Mesh]] = []
 
     def keeps_faces(self, state: State, trial: State) -> bool:
-        """Whether no face turns over, nor has sides that cross where they did not."""
-        if not self._may_turn and bool((self._mesh(trial).crossing & ~self._mesh(state).crossing).any()):
-            return False
+        """Whether no face turns over."""
         start, after = self._start.area_vectors, self._mesh(trial).area_vectors
         upright = dot(start, after) > self._upright * norm(after)
         if not self._from_last:
@@ -70,6 +68,10 @@ class FairGuard:
         if not self._may_turn:
             kept = kept & (upright | (dot(start, before) <= 0.0))
         return bool(kept.all())
+
+    def keeps_sides_apart(self, state: State, trial: State) -> bool:
+        """Whether no sides of a face cross that did not, unless faces may turn over."""
+        return self._may_turn or not bool((self._mesh(trial).crossing & ~self._mesh(state).crossing).any())
 
     def keeps_bounds(self, trial: State) -> bool:
         """Whether no corner angle, side or area falls below its bound where gliding vertices are put in place."""

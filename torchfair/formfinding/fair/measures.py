@@ -16,6 +16,7 @@ from ...geometry import corner_angles, edge_lengths, face_areas, face_normals
 from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
 from ..job.promises import Promise, handle_promise
+from .crossing_sides import crossing_sides
 from .panel_sizes import sizes_of
 from .panels import PLANAR_PROMISE
 from .problem import FairProblem
@@ -39,9 +40,9 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         from the nearer of both; ``largest_distance_back`` from vertices of the reference surface to this one,
         and ``largest_distance_back_relative``; ``largest_boundary_distance`` of gliding vertices from their
         curve. ``smallest_angle_degrees``; ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces``
-        against the start, ``smallest_edge_ratio`` of the sides of polygons, ``largest_growth`` against the
-        larger of a face's own area and half the mean. ``largest_planarity`` of the faces kept planar and
-        ``largest_planarity_of_all`` polygons (diagonal distance over mean edge of the face),
+        against the start, ``crossing_faces``, whose sides cross, ``smallest_edge_ratio`` of the sides of polygons,
+        ``largest_growth`` against the larger of a face's own area and half the mean. ``largest_planarity`` of the
+        faces kept planar and ``largest_planarity_of_all`` polygons (diagonal distance over mean edge of the face),
         ``largest_planarity_growth`` of those that are nearly planar. ``largest_fold_degrees`` of the edges kept
         flat. ``largest_handle_distance``.
     """
@@ -85,6 +86,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "smallest_edge_ratio": float(sides.min()) if sides.numel() else 1.0,
         "shortest_edge": float(lengths.min()),
         "flipped_faces": int((turned <= 0.0).sum()),
+        "crossing_faces": int(crossing_sides(vertices, topology).sum()),
         "largest_planarity": _largest(warps[problem.panels.planar]),
         "largest_planarity_of_all": _largest(warps[topology.face_sizes > 3]),
         "largest_planarity_growth": max(0.0, _largest(problem.panels.nearly.growth(warps))),
@@ -133,7 +135,7 @@ def _distance_promises(problem: FairProblem, before: Mapping[str, float], after:
 
 
 def _face_promises(problem: FairProblem, before: Mapping[str, float], after: Mapping[str, float]) -> list[Promise]:
-    """Angles, areas and sides of faces, and that none is turned over."""
+    """Angles, areas and sides of faces, and that none is turned over, nor its sides cross."""
     settings, promises = problem.settings, []
     if settings.quality_weight:
         asked = math.degrees(settings.smallest_angle)
@@ -150,6 +152,10 @@ def _face_promises(problem: FairProblem, before: Mapping[str, float], after: Map
     if not settings.faces_may_turn:
         remedy = "pull less, in several steps, or allow it: faces_may_turn"
         promises.append(Promise("faces turned over", 0.0, after["flipped_faces"], remedy=remedy))
+    if not settings.faces_may_turn and int(problem.topology.face_sizes.max()) > 3:
+        most, crossing = before["crossing_faces"], after["crossing_faces"]
+        remedy = "hold the boundary, or raise smallest_edge and smallest_area"
+        promises.append(Promise("faces that cross themselves", most, crossing, remedy=remedy))
     return promises
 
 

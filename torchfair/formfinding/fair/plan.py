@@ -52,6 +52,31 @@ class FairPlan(Plan):
         self._problem = problem
 
     def stages(self) -> Stages:
+        """All stages; from the start with no step after which sides of faces cross, once one ends with such faces.
+
+        Within a stage they may cross, as where vertices that glide along the boundary pass each other and come back.
+        Faces that cannot become planar even so are not tried again.
+        """
+        problem, start = self._problem, self.state["vertices"]
+        put_back, notes, crossed = problem.snapshot(), len(problem.notes), False
+        problem.sides_may_cross = not problem.settings.projection.takes_every_step
+        try:
+            for stage in self._solved():
+                yield stage
+                crossed = problem.sides_may_cross and problem.crosses_sides(self.state["vertices"])
+                if crossed:
+                    break
+        finally:
+            problem.sides_may_cross = False
+        if crossed:
+            are_warped = problem.planarity.most_warped < math.inf
+            put_back()
+            del problem.notes[notes:]
+            self.state = problem.blocks(start)
+            warp = problem.planarity.largest_warp(start)
+            yield from self._not_warped_more(warp) if are_warped else self._solved()
+
+    def _solved(self) -> Stages:
         """All portions; where that leaves faces warped or raises E much, faces are made planar first, E lowered then.
 
         Where neither helps, they are made planar from where the planes of faces meet. The best is kept, of those within

@@ -83,9 +83,7 @@ class PlanarityGoal:
         stay = problem.stays() | problem.pulls.pulled | problem.pulls.held
         moved = torch.where(stay[:, None], vertices, on_face_planes(vertices, problem.topology, problem.panels.planar))
         state, trial = {"vertices": vertices}, {"vertices": moved}
-        if torch.equal(moved, vertices) or not (
-            problem.guard.keeps_faces(state, trial) and problem.guard.keeps_bounds(trial)
-        ):
+        if torch.equal(moved, vertices) or not problem.keeps_faces(state, trial):
             return None
         return None if not problem.settings.planar_distance and self._leaves_limits(moved) else moved
 
@@ -107,7 +105,5 @@ class PlanarityGoal:
 
     def _leaves_limits(self, vertices: Tensor) -> bool:
         problem = self._problem
-        limits = problem.near.limits
-        return limits is not None and bool(
-            (problem.near.distances(problem.placed({"vertices": vertices})) > limits).any()
-        )
+        limits, placed = problem.near.limits, problem.placed({"vertices": vertices})
+        return limits is not None and bool((problem.near.distances(placed) > limits).any())

@@ -62,6 +62,7 @@ class FairProblem:
         panels: Faces that are kept planar and edges that are kept flat.
         loose: (V,) bool, corners of boundary and creases that become planar faces may take along.
         planarity: Planar faces as a goal, and what they may cost.
+        sides_may_cross: Whether steps may lead where sides of faces cross, because the end is looked at.
         boundary: Curves on which vertices of the boundary and of creases glide; None if none do.
         notes: Decisions taken, in words.
     """
@@ -93,7 +94,7 @@ class FairProblem:
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
         self.boundary = self._gliding_boundary()
-        self.planarity = PlanarityGoal(self)
+        self.planarity, self.sides_may_cross = PlanarityGoal(self), False
         self.near = self._nearness(reference or (vertices, topology), surface)
 
     def _nearness(self, reference: GivenReference, surface: Reference | None = None) -> Nearness:
@@ -255,13 +256,22 @@ class FairProblem:
         """The vertices (V, 3) of the mesh of a state: gliding ones are put on their curves."""
         return state["vertices"] if self.boundary is None else self.boundary.placed(state)
 
+    def keeps_faces(self, state: State, trial: State) -> bool:
+        """Whether a step leaves faces as good as they have to be, and crosses no sides unless they may on the way."""
+        kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
+        return kept and (self.sides_may_cross or self.guard.keeps_sides_apart(state, trial))
+
+    def crosses_sides(self, vertices: Tensor) -> bool:
+        """Whether sides of faces of ``vertices`` (V, 3) cross that do not at the start."""
+        return not self.guard.keeps_sides_apart({"vertices": self.vertices}, {"vertices": vertices})
+
     def admits(self, state: State, trial: State) -> bool:
         """Whether a step may be taken: no face turns over, bounds hold, and E does not rise above that of the start.
 
         E may rise where handles, another reference or planarity ask for a different shape, and on the way back from
         where handles have been.
         """
-        kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
+        kept = self.keeps_faces(state, trial)
         if kept and self.planarity.most_warped < math.inf:
             kept = self.planarity.largest_warp(trial["vertices"]) <= self.planarity.most_warped
         rises = self.has_other_goals or self.near.is_on_the_way_back

@@ -199,8 +199,8 @@ def minimise_normal_variation(
     above its start (unless handles, another reference or planarity ask for a different shape); no vertex goes farther
     from the reference surface than ``settings.distance_limit`` (gliding boundary vertices are on smooth curves through
     the boundary, which bulge over its chords); no corner angle and no face area falls below its bound; no face flips;
-    faces that are kept planar are, and panels of coplanar triangles stay flat. No step is taken after which sides of a
-    face cross that did not (unless faces may turn). The problem is solved centred and with unit mean edge length, so
+    faces that are kept planar are, and panels of coplanar triangles stay flat. No more faces have sides that
+    cross than at the start (unless faces may turn). The problem is solved centred and with unit mean edge length, so
     results do not depend on the unit.
 
     Args:
