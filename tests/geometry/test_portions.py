@@ -10,6 +10,7 @@ from torchfair import Topology, _portions
 from torchfair.geometry import (
     balanced_normals,
     corrected_shape_operators,
+    dihedral_angles,
     face_area_vectors,
     face_normals,
     planarity,
@@ -25,7 +26,8 @@ def mixed() -> tuple[torch.Tensor, Topology]:
 
 
 @pytest.mark.parametrize(
-    "function", [face_area_vectors, face_normals, planarity, balanced_normals, corrected_shape_operators]
+    "function",
+    [face_area_vectors, face_normals, planarity, balanced_normals, corrected_shape_operators, dihedral_angles],
 )
 @pytest.mark.parametrize("mesh", [mixed, lambda: wavy_grid(9, 8, triangles=True)])
 def test_portions_change_no_bit(function, mesh, monkeypatch):

@@ -12,7 +12,7 @@ from torch import Tensor
 from torchfair import ShapeError
 from torchfair.rasterisation import scan
 from torchfair.rasterisation.rasterise import interpolate, rasterise, visible_triangles
-from torchfair.rasterisation.scan import triangle_spans
+from torchfair.rasterisation.scan import Spans, triangle_spans
 
 TWO = torch.tensor([[0, 1, 2], [0, 2, 3]])
 
@@ -26,6 +26,10 @@ def random_triangles(count: int, size: float, seed: int) -> tuple[Tensor, Tensor
     generator = np.random.default_rng(seed)
     points = generator.uniform(-0.2 * size, 1.2 * size, (3 * count, 3))
     return torch.from_numpy(points), torch.arange(3 * count).view(count, 3)
+
+
+def all_spans(points: Tensor, triangles: Tensor, width: int, height: int) -> Spans:
+    return Spans(*(torch.cat(parts) for parts in zip(*triangle_spans(points, triangles, width, height), strict=True)))
 
 
 def naive(points: Tensor, triangles: Tensor, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
@@ -60,7 +64,7 @@ def test_meshes_are_covered_without_gaps_or_overlaps(dtype: torch.dtype) -> None
     plane = np.unique(np.concatenate([corners, np.clip(inner, 0, 64)]), axis=0)
     triangles = torch.from_numpy(Delaunay(plane).simplices.astype(np.int64))
     points = torch.from_numpy(np.c_[plane, np.zeros(len(plane))]).to(dtype)
-    assert triangle_spans(points, triangles, 64, 64).length.sum() == 64 * 64
+    assert all_spans(points, triangles, 64, 64).length.sum() == 64 * 64
     assert bool((visible_triangles(points, triangles, 64, 64) >= 0).all())
 
 
@@ -170,10 +174,24 @@ def test_wrong_shapes_are_named(points: Tensor, triangles: Tensor, size: tuple[i
 
 def test_triangles_scanned_some_at_a_time_cover_the_same_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
     points, triangles = random_triangles(50, 9.0, 3)
-    whole = triangle_spans(points, triangles, 40, 30)
+    whole = all_spans(points, triangles, 40, 30)
     monkeypatch.setattr(scan, "_TRIANGLES", 7)
-    for mine, expected in zip(triangle_spans(points, triangles, 40, 30), whole, strict=True):
+    for mine, expected in zip(all_spans(points, triangles, 40, 30), whole, strict=True):
         assert torch.equal(mine, expected)
+
+
+def test_triangles_are_seen_the_same_however_many_are_scanned_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In three pictures, of which depths in one are a thousand times as large as in the others."""
+    points, triangles = random_triangles(60, 30.0, 6)
+    pictures = torch.arange(60) % 3
+    points[triangles[pictures == 1].flatten(), 2] *= 1000.0
+    whole = visible_triangles(points, triangles, 30, 30, pictures=pictures, num_pictures=3)
+    monkeypatch.setattr(scan, "_TRIANGLES", 7)
+    assert torch.equal(visible_triangles(points, triangles, 30, 30, pictures=pictures, num_pictures=3), whole)
+    for number in range(3):
+        mine = torch.nonzero(pictures == number).squeeze(1)
+        alone = visible_triangles(points, triangles[mine], 30, 30)
+        assert torch.equal(torch.where(alone < 0, -1, mine[alone]), whole[number])
 
 
 def spans_one_by_one(points: Tensor, triangles: Tensor, width: int, height: int) -> list[tuple[int, int, int, int]]:
@@ -209,7 +227,7 @@ def test_spans_against_crossings_of_edges_one_by_one(case: int) -> None:
     if case % 2:
         points[3, 0], points[7, 1], points[11, 2] = math.nan, math.inf, -math.inf
     triangles = torch.randint(0, 20, (60, 3))
-    spans = triangle_spans(points, triangles, 37, 29)
+    spans = all_spans(points, triangles, 37, 29)
     columns = torch.stack([spans.triangle, spans.row, spans.start, spans.length], 1)
     expected = spans_one_by_one(points, triangles, 37, 29)
     assert expected

@@ -7,7 +7,7 @@ from helpers import DOUBLE, cube
 from torchfair import Topology
 from torchfair.rasterisation.rasterise import visible_triangles
 from torchfair.shapes import icosphere
-from torchfair.viewing import lines
+from torchfair.viewing import hiding, lines
 from torchfair.viewing.camera import fit_camera
 from torchfair.viewing.lines import Surface, visible_lines
 from torchfair.viewing.render import MeshView
@@ -107,12 +107,50 @@ def test_lines_hidden_as_a_whole_are_told_by_blocks(block: int, monkeypatch: pyt
     view = MeshView(vertices, topology, camera, size)
     surface = Surface(view.points, view.triangulation.triangles, view.triangle_index)
     widths = 1.0 + 2.0 * torch.rand(topology.num_edges, generator=generator)
+    monkeypatch.setattr(lines, "_PORTION", topology.num_edges)
     looked_at, put = [], lines._put_lines
-    monkeypatch.setattr(lines, "_put_lines", lambda *a: (looked_at.append(len(a[2])), put(*a)))
+    monkeypatch.setattr(lines, "_put_lines", lambda *a: (looked_at.append(len(a[2].ends)), put(*a)))
     one_by_one = visible_lines(surface, topology.edges, widths)
     monkeypatch.setattr(lines, "_MANY", 1)
-    monkeypatch.setattr(lines, "_BLOCK", block)
+    monkeypatch.setattr(hiding, "_BLOCK", block)
     assert torch.equal(visible_lines(surface, topology.edges, widths), one_by_one)
     assert looked_at[0] == topology.num_edges
     assert looked_at[1] < 0.8 * looked_at[0]
     assert (one_by_one >= 0).any()
+
+
+def shaken_sphere() -> tuple[Surface, torch.Tensor, torch.Tensor]:
+    """A surface, partly off the screen, its edges, and widths."""
+    mesh, generator = icosphere(2), torch.Generator().manual_seed(2)
+    vertices = mesh.vertices + 0.15 * torch.rand(mesh.vertices.shape, generator=generator, dtype=DOUBLE)
+    towards_eye, up = torch.tensor([[1.0, 0.4, 0.3], [0.0, 0.0, 1.0]], dtype=DOUBLE)
+    camera, size = fit_camera(vertices[vertices[:, 1] > -0.8], towards_eye=towards_eye, up=up, width=90)
+    view = MeshView(vertices, mesh.topology, camera, size, supersampling=1)
+    surface = Surface(view.points, view.triangulation.triangles, view.triangle_index)
+    return surface, mesh.topology.edges, 5.0 * torch.rand(mesh.topology.num_edges, generator=generator)
+
+
+def test_lines_with_numbers_may_come_in_any_order() -> None:
+    surface, edges, widths = shaken_sphere()
+    order = torch.randperm(len(edges), generator=torch.Generator().manual_seed(3))
+    ordered = visible_lines(surface, edges, widths)
+    assert torch.equal(visible_lines(surface, edges[order], widths[order], order), ordered)
+    widths[::3] = 0.0
+    again = visible_lines(surface, edges[order], widths[order], order)
+    assert torch.equal(again, visible_lines(surface, edges, widths))
+    assert not torch.equal(again, ordered)
+
+
+def test_lines_together_are_the_largest_of_lines_alone() -> None:
+    """Some seen from end to end, some in part and some not at all; depths of all stay what they are."""
+    surface, edges, widths = shaken_sphere()
+    beside = torch.stack([surface.points.amin(0), surface.points.amax(0)])
+    beside[:, 0] = -50.0
+    surface = surface._replace(points=torch.cat([surface.points, beside]))
+    depths = torch.tensor([[len(surface.points) - 2, len(surface.points) - 1]])
+    together = visible_lines(surface, torch.cat([depths, edges]), torch.cat([torch.ones(1), widths]))
+    expected = torch.full_like(together, -1)
+    for number in range(len(edges)):
+        alone = visible_lines(surface, torch.cat([depths, edges[number : number + 1]]), widths[[0, number]])
+        expected = torch.where(alone == 1, number + 1, expected)
+    assert torch.equal(together, expected)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from .._portions import portions_unless
 from .._remembered import remembered
 from ..topology import Topology
 from ._any_size import of_any_size
-from ._ops import cross, dot, norm
-from .lengths import edge_vectors
-from .normals import adjacent_normals
+from ._ops import cross, dot, gather, norm
+from .normals import face_normals
 
 
 @remembered
@@ -53,16 +53,26 @@ def dihedral_angles(vertices: Tensor, topology: Topology) -> Tensor:
         >>> torch.rad2deg(dihedral_angles(vertices, topology))  # convex: the ridge is an edge of a roof
         tensor([53.1301])
     """
-    edges = edge_vectors(vertices, topology)[..., : topology.num_interior_edges, :]
-    left, right, valid = adjacent_normals(vertices, topology)
+    normals = face_normals(vertices, topology)
+    portions = portions_unless(vertices.requires_grad, topology.num_interior_edges, vertices)
+    parts = [_sine_and_cosine(vertices, normals, topology, part) for part in portions]
+    sine, cosine = parts[0] if len(parts) == 1 else (torch.cat(each, dim=-1) for each in zip(*parts, strict=True))
+    return torch.atan2(sine, cosine)  # at once: its last bits depend on how many are worked out together
+
+
+def _sine_and_cosine(vertices: Tensor, normals: Tensor, topology: Topology, part: slice) -> tuple[Tensor, Tensor]:
+    """Those (*batch, n) of some interior edges, with the normals (*batch, F, 3): temporaries stay in the cache."""
+    v, w = topology.edges[: topology.num_interior_edges][part].unbind(1)
+    edges = gather(vertices, w) - gather(vertices, v)
+    left, right = (gather(normals, faces) for faces in topology.interior_edge_faces[part].unbind(1))
     lengths = norm(edges)
-    valid = valid & (lengths > 0)
+    valid = (left != 0).any(-1) & (right != 0).any(-1) & (lengths > 0)
     axis = cross(left, right)
     sine = dot(axis, edges) / torch.where(valid, lengths, 1.0)
     if not topology.is_triangular:
         sine = _lengthen(sine, axis)
     # (0, 1) has angle 0 and keeps atan2 away from (0, 0), where its derivative is NaN.
-    return torch.atan2(torch.where(valid, sine, 0.0), torch.where(valid, dot(left, right), 1.0))
+    return torch.where(valid, sine, 0.0), torch.where(valid, dot(left, right), 1.0)
 
 
 def _lengthen(sine: Tensor, axis: Tensor) -> Tensor:

@@ -16,8 +16,18 @@ def key_bits(count: int) -> int:
 
 def depth_levels(lower: Tensor, upper: Tensor, picture: Tensor, num_pictures: int, bits: int) -> tuple[Tensor, Tensor]:
     """Origin and scale (pictures,) that map depths between ``lower`` and ``upper`` (n,), float64, to levels."""
+    return levels_within(*depth_range(lower, upper, picture, num_pictures), bits)
+
+
+def depth_range(lower: Tensor, upper: Tensor, picture: Tensor, num_pictures: int) -> tuple[Tensor, Tensor]:
+    """Least ``lower`` and greatest ``upper`` depth (pictures,) in each picture; of nothing inf and -inf."""
     low = lower.new_full((num_pictures,), torch.inf).scatter_reduce_(0, picture, lower, "amin")
     high = lower.new_full((num_pictures,), -torch.inf).scatter_reduce_(0, picture, upper, "amax")
+    return low, high
+
+
+def levels_within(low: Tensor, high: Tensor, bits: int) -> tuple[Tensor, Tensor]:
+    """Origin and scale (pictures,) that map depths from ``low`` to ``high`` (pictures,) to levels."""
     extent = high - low
     return low, (1 << (62 - bits)) / torch.where(extent > 0, extent, 1)
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ..errors import ShapeError
-from .depth_keys import NO_KEY, depth_levels, key_bits, pack_keys, unpack_keys
+from .depth_keys import NO_KEY, depth_range, key_bits, levels_within, pack_keys, unpack_keys
 from .scan import Spans, span_chunks, triangle_spans
 
 _BAND = 1 << 16  # pixels worked on at a time on a CPU: keeps every temporary inside the cache
@@ -80,16 +80,17 @@ def visible_triangles(
     shape = (height, width) if num_pictures is None else (num_pictures, height, width)
     nearest = torch.full((math.prod(shape),), NO_KEY, device=points.device)
     bits = key_bits(triangles.shape[0])
-    spans = triangle_spans(points, triangles, width, height)
-    picture = spans.triangle.new_zeros(()).expand_as(spans.triangle)
-    if pictures is not None:
-        picture = pictures.index_select(0, spans.triangle)
-    first_pixel = (picture * height + spans.row) * width + spans.start
-    first_level, level_step = _quantise(spans, picture, num_pictures or 1, bits)
-    for span, offset in span_chunks(spans):
-        level = first_level.index_select(0, span) + level_step.index_select(0, span) * offset
-        key = pack_keys(level, spans.triangle.index_select(0, span), bits)
-        nearest.scatter_reduce_(0, first_pixel.index_select(0, span) + offset, key, "amin")
+    parts = list(triangle_spans(points, triangles, width, height))
+    in_pictures = [_pictures_of(spans, pictures) for spans in parts]
+    origin, scale = _levels(parts, in_pictures, num_pictures or 1, bits)
+    for spans, picture in zip(parts, in_pictures, strict=True):
+        first_pixel = (picture * height + spans.row) * width + spans.start
+        step = scale.index_select(0, picture)
+        first_level, level_step = (spans.depth - origin.index_select(0, picture)) * step, spans.depth_step * step
+        for span, offset in span_chunks(spans):
+            level = first_level.index_select(0, span) + level_step.index_select(0, span) * offset
+            key = pack_keys(level, spans.triangle.index_select(0, span), bits)
+            nearest.scatter_reduce_(0, first_pixel.index_select(0, span) + offset, key, "amin")
     return unpack_keys(nearest, bits).view(shape)
 
 
@@ -133,13 +134,22 @@ def _affine_tables(points: Tensor, triangles: Tensor) -> Tensor:
     return torch.cat([torch.cat([origin, first, second], dim=1), background])
 
 
-def _quantise(spans: Spans, picture: Tensor, num_pictures: int, bits: int) -> tuple[Tensor, Tensor]:
-    """Depth levels of spans: first pixel and step."""
-    last = spans.depth + spans.depth_step * (spans.length - 1)
-    lower, upper = torch.minimum(spans.depth, last), torch.maximum(spans.depth, last)
-    origin, scale = depth_levels(lower, upper, picture, num_pictures, bits)
-    scale = scale.index_select(0, picture)
-    return (spans.depth - origin.index_select(0, picture)) * scale, spans.depth_step * scale
+def _pictures_of(spans: Spans, pictures: Tensor | None) -> Tensor:
+    """(S,) picture of each span."""
+    if pictures is None:
+        return spans.triangle.new_zeros(()).expand_as(spans.triangle)
+    return pictures.index_select(0, spans.triangle)
+
+
+def _levels(parts: list[Spans], in_pictures: list[Tensor], num_pictures: int, bits: int) -> tuple[Tensor, Tensor]:
+    """Origin and scale (pictures,) of the depth levels of all spans."""
+    ranges = []
+    for spans, picture in zip(parts, in_pictures, strict=True):
+        last = spans.depth + spans.depth_step * (spans.length - 1)
+        lower, upper = torch.minimum(spans.depth, last), torch.maximum(spans.depth, last)
+        ranges.append(depth_range(lower, upper, picture, num_pictures))
+    low, high = (torch.stack(ends) for ends in zip(*ranges, strict=True))
+    return levels_within(low.amin(0), high.amax(0), bits)
 
 
 def _check(points: Tensor, triangles: Tensor, width: int, height: int) -> None:

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from .runs import expand_counts, run_chunks
 
-_TRIANGLES = 1 << 18  # scanned at a time on a CPU: most of a large mesh cover no pixel
+_TRIANGLES = 1 << 16  # scanned at a time on a CPU: most of a large mesh cover no pixel
 _SLACK = 1e-6  # pixels: far above the rounding of crossings, which may lie outside of their triangle by it
 _CHUNK = 1 << 17  # pixels handed out at a time on a CPU: keeps every temporary inside the cache
 
@@ -29,8 +29,11 @@ class Spans(NamedTuple):
     depth_step: Tensor  # from one pixel to the next
 
 
-def triangle_spans(points: Tensor, triangles: Tensor, width: int, height: int) -> Spans:
+def triangle_spans(points: Tensor, triangles: Tensor, width: int, height: int) -> Iterator[Spans]:
     r"""The runs of pixels whose centres lie in each triangle, clipped to the screen.
+
+    Of some triangles after the other, in one part at least: pieces that are small stay in the cache and can be used
+    again, where runs of a large mesh in one piece are pages that the system has to clear.
 
     A run is half-open, from the left edge to the right edge; rows are half-open from top to bottom. Crossings of
     an edge are computed from its two points in a fixed order, so triangles that share the edge agree on them to
@@ -42,9 +45,8 @@ def triangle_spans(points: Tensor, triangles: Tensor, width: int, height: int) -
     """
     portion = _TRIANGLES if triangles.is_cpu else max(triangles.shape[0], 1)
     screen = _Screen.of(points, width, height)
-    some = enumerate(torch.split(triangles, portion))
-    parts = [_spans(screen, chosen, number * portion) for number, chosen in some]
-    return parts[0] if len(parts) == 1 else Spans(*(torch.cat(columns) for columns in zip(*parts, strict=True)))
+    for number, chosen in enumerate(torch.split(triangles, portion)):
+        yield _spans(screen, chosen, number * portion)
 
 
 class _Screen(NamedTuple):
@@ -75,7 +77,7 @@ class _Screen(NamedTuple):
         if not every:
             x, y, depth = (torch.where(usable, part, 0) for part in (x, y, depth))
         left, right, row = (
-            _first_centre(part, size).to(torch.int32)
+            first_centre(part, size).to(torch.int32)
             for part, size in ((x - _SLACK, width), (x + _SLACK, width), (y, height))
         )
         return cls((x, y, depth), left, right, row, None if every else usable, width)
@@ -98,7 +100,7 @@ def _spans(screen: _Screen, triangles: Tensor, before: int) -> Spans:
     triangle, offset = expand_counts(bottom - top)
     row = top.index_select(0, triangle) + offset
     left, right = _crossings(x, y, triangle, row.to(torch.float64) + 0.5)
-    start, stop = _first_centre(left, screen.width), _first_centre(right, screen.width)
+    start, stop = first_centre(left, screen.width), first_centre(right, screen.width)
     filled = torch.nonzero(stop > start).squeeze(1)
     triangle, row, start, stop = (part.index_select(0, filled) for part in (triangle, row, start, stop))
     first, step = _depths(x, y, depth, triangle, row, start, stop)
@@ -110,7 +112,7 @@ def span_chunks(spans: Spans) -> Iterator[tuple[Tensor, Tensor]]:
     return run_chunks(torch.zeros_like(spans.length), spans.length, _CHUNK)
 
 
-def _first_centre(coordinate: Tensor, size: int) -> Tensor:
+def first_centre(coordinate: Tensor, size: int) -> Tensor:
     """Number of the first pixel whose centre is at or beyond ``coordinate``, within ``0 .. size``."""
     return (coordinate - 0.5).ceil().clamp(0, size).to(torch.int64)
 
@@ -135,7 +137,7 @@ def _crossings(x: list[Tensor], y: list[Tensor], triangle: Tensor, centre: Tenso
         centre: (S,) from the top of that triangle on, above its bottom.
     """
     (x0, y0), (x1, y1), (x2, y2) = _downwards(x, y)
-    long, upper, lower = _slope(x0, y0, x2, y2), _slope(x0, y0, x1, y1), _slope(x1, y1, x2, y2)
+    long, upper, lower = slope(x0, y0, x2, y2), slope(x0, y0, x1, y1), slope(x1, y1, x2, y2)
     x0, y0, x1, y1, long, upper, lower = (
         part.index_select(0, triangle) for part in (x0, y0, x1, y1, long, upper, lower)
     )
@@ -156,7 +158,7 @@ def _downwards(x: list[Tensor], y: list[Tensor]) -> list[tuple[Tensor, Tensor]]:
     return points
 
 
-def _slope(x0: Tensor, y0: Tensor, x1: Tensor, y1: Tensor) -> Tensor:
+def slope(x0: Tensor, y0: Tensor, x1: Tensor, y1: Tensor) -> Tensor:
     """Step in x for one down along edges; of no use for level ones, which no line crosses."""
     rise = y1 - y0
     return (x1 - x0) / torch.where(rise > 0, rise, 1)

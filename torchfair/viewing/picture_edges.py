@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from .._one_mesh import one_mesh
+from .._remembered import remembering
 from ..energies import angle_variation_per_edge
 from ..errors import ShapeError
 from ..geometry import edge_lengths
@@ -67,24 +68,25 @@ def picture_edges(
         raise ShapeError("meshes", "at least one", "none")
     topologies = topologies_of(len(meshes), topology)
     vertices = [one_mesh(v, t) for v, t in zip(meshes.values(), topologies, strict=True)]
-    terms = [angle_variation_per_edge(v, t) for v, t in zip(vertices, topologies, strict=True)]
-    label, values = _comparable(terms, vertices, topologies)
-    scale = ColorScale.of(torch.cat(values), label, color_map="magma_r", lightest=_LIGHTEST)
-    columns = min(columns, len(meshes))
-    panel = (width - 2 * MARGIN - BAR - (columns - 1) * GAP) // columns
-    towards_eye, up = view or view_direction(vertices[0], topologies[0])
-    camera, size = fit_camera(*vertices, towards_eye=towards_eye, up=up, width=panel)
+    with remembering():
+        terms = [angle_variation_per_edge(v, t) for v, t in zip(vertices, topologies, strict=True)]
+        label, values = _comparable(terms, vertices, topologies)
+        scale = ColorScale.of(torch.cat(values), label, color_map="magma_r", lightest=_LIGHTEST)
+        columns = min(columns, len(meshes))
+        panel = (width - 2 * MARGIN - BAR - (columns - 1) * GAP) // columns
+        towards_eye, up = view or view_direction(vertices[0], topologies[0])
+        camera, size = fit_camera(*vertices, towards_eye=towards_eye, up=up, width=panel)
 
-    row = CAPTION + size[0]
-    rows = -(-len(meshes) // columns)
-    sheet = Sheet(width, rows * row + MARGIN, title)
-    for number, (name, mesh) in enumerate(zip(meshes, vertices, strict=True)):
-        left = MARGIN + (number % columns) * (panel + GAP)
-        top = sheet.top + (number // columns) * row
-        sheet.caption(energy_caption(name, mesh, topologies[number], terms=terms[number]), left, top, panel)
-        shown = MeshView(mesh, topologies[number], camera, size)
-        sheet.image(_panel(shown, values[number], scale), left, top + CAPTION)
-    scale.draw_bar(sheet, rows * row)
+        row = CAPTION + size[0]
+        rows = -(-len(meshes) // columns)
+        sheet = Sheet(width, rows * row + MARGIN, title)
+        for number, (name, mesh) in enumerate(zip(meshes, vertices, strict=True)):
+            left = MARGIN + (number % columns) * (panel + GAP)
+            top = sheet.top + (number // columns) * row
+            sheet.caption(energy_caption(name, mesh, topologies[number], terms=terms[number]), left, top, panel)
+            shown = MeshView(mesh, topologies[number], camera, size)
+            sheet.image(_panel(shown, values[number], scale), left, top + CAPTION)
+        scale.draw_bar(sheet, rows * row)
     return sheet.write(path, overwrite=overwrite)
 
 

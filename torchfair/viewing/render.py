@@ -146,12 +146,13 @@ class MeshView:
         count, device = self.topology.num_edges, self.points.device
         widths = torch.as_tensor(style.widths, dtype=torch.float64, device=device).expand(count)
         widths = torch.where(widths > 0, (widths * self.supersampling).clamp(min=1), 0)
-        order = (
-            torch.arange(count, device=device) if style.order is None else style.order.to(device).argsort(stable=True)
-        )
         surface = Surface(self.points, self.triangulation.triangles, self.triangle_index)
-        lines = visible_lines(surface, self.topology.edges[order], widths[order])
-        return lines, style.colors.to(device, torch.float32).expand(count, 3)[order]
+        colors = style.colors.to(device, torch.float32).expand(count, 3)
+        if style.order is None:
+            return visible_lines(surface, self.topology.edges, widths), colors
+        order = style.order.to(device).argsort(stable=True)
+        places = torch.empty_like(order).scatter_(0, order, torch.arange(count, device=device))
+        return visible_lines(surface, self.topology.edges, widths, places), colors[order]
 
     def _rim(self, width: float) -> Tensor:
         """Samples of the mesh within a distance, in pixels, of the background."""
