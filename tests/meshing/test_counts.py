@@ -97,7 +97,8 @@ def corrected(monkeypatch: pytest.MonkeyPatch, count: int, faces: Any) -> tuple[
 
     monkeypatch.setattr(counts, "mesh_components", made)
     monkeypatch.setattr(counts, "_told", lambda pieces, *_: pieces)
-    found, _ = mesh_to_count(cast(Any, None), [], 1.0, MeshingSettings(), count, lambda pieces: cast(Any, pieces).faces)
+    surface = cast(Any, SimpleNamespace(parts=[]))
+    found, _ = mesh_to_count(surface, [], 1.0, MeshingSettings(), count, lambda pieces: cast(Any, pieces).faces)
     return cast(Any, found).faces, asked
 
 
@@ -125,12 +126,17 @@ def test_spacings_that_failed_are_not_tried_again(monkeypatch: pytest.MonkeyPatc
     assert [spacing for spacing, _ in asked] == pytest.approx([0.85**0.5, 0.85**0.25])
 
 
-@pytest.mark.parametrize(("fine", "found"), [(110, 110), (130, 60)])
+@pytest.mark.parametrize(("fine", "found", "cuts"), [(110, 110, True), (130, 60, True), (110, 60, False)])
 def test_where_no_spacing_comes_near_the_count_finer_triangles_are_tried(
-    monkeypatch: pytest.MonkeyPatch, fine: int, found: int
+    monkeypatch: pytest.MonkeyPatch, fine: int, found: int, cuts: bool
 ) -> None:
-    """Turned boxes had 60 of 100 triangles with all spacings on the same triangles; finer ones count if they help."""
+    """Turned boxes had 60 of 100 triangles with all spacings on the same triangles; finer ones count if they help.
+
+    Where triangles are not cut for half of the spacing, all would be done once more for the same meshes.
+    """
     resolutions: list[float] = []
+    parts = [SimpleNamespace(is_cut_for=lambda _: False), SimpleNamespace(is_cut_for=lambda at: cuts and at == 0.5)]
+    surface = cast(Any, SimpleNamespace(parts=parts))
 
     def made(_surface: Any, _lattices: Any, _spacing: float, _settings: Any, again: list[Again] | None = None) -> Any:
         resolutions.extend([] if again is None else [again[0].resolution])
@@ -139,6 +145,6 @@ def test_where_no_spacing_comes_near_the_count_finer_triangles_are_tried(
 
     monkeypatch.setattr(counts, "mesh_components", made)
     monkeypatch.setattr(counts, "_told", lambda pieces, *_: pieces)
-    pieces, _ = mesh_to_count(cast(Any, None), [], 1.0, MeshingSettings(), 100, lambda of: cast(Any, of).faces)
+    pieces, _ = mesh_to_count(surface, [], 1.0, MeshingSettings(), 100, lambda of: cast(Any, of).faces)
     assert cast(Any, pieces).faces == found
-    assert resolutions.count(0.5) >= 1
+    assert (0.5 in resolutions) == cuts

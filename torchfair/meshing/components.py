@@ -28,6 +28,7 @@ from .sizes import SizeField
 from .surface import DesignSurface, components_of
 from .surface_curvature import smooth_absolute_curvature
 from .verification import Shape, shape_of, verify_corners
+from .welded import check_welded
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +117,14 @@ class ReadSurface:
         return shape_of(self.whole[1])
 
 
-def read_surface(vertices: Tensor, topology: Topology, settings: MeshingSettings) -> ReadSurface:
-    """The components of a mesh with their directions. Errors as of :func:`principal_quads`."""
+def read_surface(
+    vertices: Tensor, topology: Topology, settings: MeshingSettings, count: int | None = None
+) -> ReadSurface:
+    """The components of a mesh with their directions. Errors as of :func:`principal_quads`, for a count of faces."""
     parts = components_of(vertices, topology, settings.crease_angle)
+    if count is not None:
+        check_count("count", count, least=1)
+        check_welded(vertices, topology, len(parts), count)
     found = [part.directions(settings.noise) for part in parts]
     notes = [
         f"{_name(number, len(parts))}the surface is rough: curvature fitted over {fitted.rings} rings"

@@ -108,8 +108,11 @@ class _Search:
         return best, spacing
 
     def laid_again(self, best: Pieces, spacing: float) -> Pieces | None:
-        """A mesh with the first spacing on finer triangles, by any plan that keeps what the best keeps, if any."""
-        if self.is_late:
+        """A mesh with the first spacing on finer triangles, by any plan that keeps what the best keeps, if any.
+
+        None, too, where triangles are fine enough as they are: all would come out as before.
+        """
+        if self.is_late or not any(part.is_cut_for(_FINEST * spacing) for part in self.surface.parts):
             return None
         return self._made([Again(0, _FINEST * spacing)] * len(best.plans), spacing, best)
 

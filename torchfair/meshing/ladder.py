@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import MeshError, SingularSystemError
 from ..fields import Directions
+from ..fields.frames import Floats
 from ..settings.meshing_settings import MeshingSettings
 from .attempt import FailedAttemptError, PieceMesh, Plan, attempt
 from .combing import combed
@@ -21,6 +22,7 @@ from .cut_graph import CutGraph
 from .lattice import Lattice
 from .plans import Kind, Rung, plans
 from .pose import Pose
+from .small_loops import small_loop
 from .surface import DesignSurface
 
 _PATHS = 1.3  # times the merging length of quads: paths along edges are longer than straight ones
@@ -99,6 +101,9 @@ def mesh_component(
         if failures[-1].hopeless:
             hopeless.add(rung.kind)
     placed = [failure for failure in failures if failure.vertex >= 0]
+    if not placed and (loop := small_loop(surface, spacing)) is not None:
+        words = f"{failures[-1]} ({_tried(len(failures))}); {loop.remedy(spacing)}"
+        raise NoMeshError(f"no valid mesh was found{_near(loop.vertex, loop.place)}: {words}", loop.vertex)
     told = placed[0] if placed else failures[-1]
     raise NoMeshError(_refusal(told, len(failures), pose), told.vertex)
 
@@ -191,12 +196,17 @@ def _in_words(plan: Plan, words: str, pose: Pose) -> str:
 
 
 def _refusal(failure: FailedAttemptError, number: int, pose: Pose) -> str:
-    where = ""
-    if failure.vertex >= 0 and failure.place is not None:
-        x, y, z = pose.back(failure.place[None])[0]
-        where = f" near vertex {failure.vertex} at ({x:.4g}, {y:.4g}, {z:.4g})"
-    tried = f"{number} setting(s) tried" if number > 1 else "one setting tried"
+    where = "" if failure.place is None else _near(failure.vertex, pose.back(failure.place[None])[0])
     return (
-        f"no valid mesh was found{where}: {failure} ({tried}). Ask for more or fewer faces, smooth directions over a "
-        "longer length (smoothing), or give a finer or smoother surface"
+        f"no valid mesh was found{where}: {failure} ({_tried(number)}). Ask for more or fewer faces, smooth directions "
+        "over a longer length (smoothing), or give a finer or smoother surface"
     )
+
+
+def _near(vertex: int, place: Floats) -> str:
+    x, y, z = place
+    return f" near vertex {vertex} at ({x:.4g}, {y:.4g}, {z:.4g})" if vertex >= 0 else ""
+
+
+def _tried(number: int) -> str:
+    return f"{number} setting(s) tried" if number > 1 else "one setting tried"

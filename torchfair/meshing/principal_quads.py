@@ -64,7 +64,8 @@ def principal_quads(
     Raises:
         ShapeError: if ``vertices`` is not one mesh that fits.
         SettingsError: if neither or both of count and spacing are given, or one is out of range.
-        MeshError: if the surface has no faces, or faces without area; :class:`NoMeshError` if no valid mesh was
+        MeshError: if the surface has no faces, faces without area, or more components than faces asked for because
+            edges at one place are not welded; :class:`NoMeshError` if no valid mesh was
             found, with the place.
 
     Example:
@@ -76,7 +77,7 @@ def principal_quads(
         (True, {})
     """
     chosen = settings or MeshingSettings()
-    surface = read_surface(vertices, topology, chosen)
+    surface = read_surface(vertices, topology, chosen, count)
     size = spacing_of(surface, SQUARES.cell, count, spacing)
     lattices = [SQUARES] * len(surface.parts)
 

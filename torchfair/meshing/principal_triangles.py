@@ -64,7 +64,7 @@ def principal_triangles(
         ([6], 0)
     """
     chosen = settings or MeshingSettings()
-    surface = read_surface(vertices, topology, chosen)
+    surface = read_surface(vertices, topology, chosen, count)
     ratio = row_distance(surface.frames, surface.directions)
     size = spacing_of(surface, ratio / 2, count, spacing)
     pieces, size = RowLattice(surface, ratio, size, count, chosen).laid()

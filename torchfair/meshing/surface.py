@@ -89,10 +89,14 @@ class DesignSurface:
         """The same as one smooth surface."""
         return replace(self, sharp=np.zeros_like(self.sharp))
 
+    def is_cut_for(self, spacing: float) -> bool:
+        """Whether triangles are too coarse for edges of a length, and not too many to be cut."""
+        return _mean_edge(self) > _COARSE * spacing and 4 * self.topology.num_faces <= _MOST_FACES
+
     def cut_finer(self, directions: Directions, spacing: float) -> tuple[DesignSurface, Directions]:
         """Triangles fine enough for edges of a length, on the same flat pieces."""
         surface = self
-        while _mean_edge(surface) > _COARSE * spacing and 4 * surface.topology.num_faces <= _MOST_FACES:
+        while surface.is_cut_for(spacing):
             finer = midpoint(surface.topology)
             new = torch.full((finer.topology.num_vertices - surface.topology.num_vertices,), -1)
             marks = torch.zeros(surface.topology.num_edges, dtype=torch.bool)

@@ -1,0 +1,69 @@
+"""What cannot be meshed is refused in one line that names the place, and what it says to do works."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+import torch
+
+from torchfair import MeshError, Topology, repair_mesh
+from torchfair.meshing import MeshingSettings, NoMeshError, principal_quads, principal_triangles
+from torchfair.shapes import Torus, irregular_triangles
+
+CUT_OFF = 0.02  # radius of the hole at the tip
+
+
+def cone(around: int = 40, along: int = 30) -> tuple[torch.Tensor, Topology]:
+    """Of radius 1, with a hole at its tip; the rim of the hole has the first vertices."""
+    radii = torch.linspace(CUT_OFF, 1, along, dtype=torch.float64)[:, None]
+    angles = torch.arange(around, dtype=torch.float64) * (2 * math.pi / around)
+    points = torch.stack([radii * angles.cos(), radii * angles.sin(), (-radii).expand(-1, around)], -1).reshape(-1, 3)
+    at = torch.arange(along * around).reshape(along, around)
+    a, b = at[:-1].reshape(-1), at[1:].reshape(-1)
+    c, d = at[1:].roll(-1, 1).reshape(-1), at[:-1].roll(-1, 1).reshape(-1)
+    return points, Topology.from_faces(torch.cat([torch.stack([a, b, c], 1), torch.stack([a, c, d], 1)]))
+
+
+@pytest.mark.parametrize("scale", [1.0, 1000.0])
+def test_a_hole_too_small_is_named_and_as_many_faces_as_are_said_go_around_it(scale: float) -> None:
+    points, topology = cone()
+    with pytest.raises(NoMeshError) as caught:
+        principal_triangles(scale * points, topology, count=100, settings=MeshingSettings(fallback=False))
+    said = str(caught.value)
+    assert "\n" not in said
+    assert 0 <= caught.value.vertex < 40
+    assert f"near vertex {caught.value.vertex} at" in said
+    length = scale * 40 * 2 * CUT_OFF * math.sin(math.pi / 40)
+    assert f"(hole) there is {length:.3g} long" in said
+    assert f"edges of {length / 3:.3g} or less" in said
+    times = float(re.findall(r"about ([\d.e+]+) times as many faces", said)[0])
+    made = principal_triangles(scale * points, topology, count=round(100 * times))
+    assert len(made.principal.topology.boundary_loops()) == 2
+    made = principal_triangles(scale * points, topology, spacing=length / 3)
+    assert len(made.principal.topology.boundary_loops()) == 2
+
+
+def test_triangles_that_share_no_vertices_are_refused_and_meshed_once_they_are_welded() -> None:
+    """Each was meshed by itself, for minutes."""
+    whole = irregular_triangles(Torus(), 400)
+    apart = whole.vertices[whole.topology.triangles].reshape(-1, 3)
+    topology = Topology.from_faces(torch.arange(len(apart)).reshape(-1, 3))
+    with pytest.raises(MeshError, match=f"{topology.num_faces} components, more than the 200") as caught:
+        principal_quads(apart, topology, count=200)
+    assert "\n" not in str(caught.value)
+    first, second, third, fourth = map(int, re.findall(r"\d+", str(caught.value).split("edges ")[2])[:4])
+    assert torch.equal(apart[[first, second]], apart[[fourth, third]])
+    joined = repair_mesh(apart, topology.triangles, weld=True)
+    made = principal_quads(joined.vertices, joined.topology, count=200)
+    assert made.report["singular"] == {}
+    assert abs(made.report["faces"] / 200 - 1) <= 0.15
+
+
+def test_more_components_than_faces_are_meshed_where_nothing_coincides() -> None:
+    """Two squares far from each other, one face asked for."""
+    square = torch.tensor([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=torch.float64)
+    vertices = torch.cat([square, square + 3])
+    topology = Topology.from_faces([[0, 1, 2, 3], [4, 5, 6, 7]])
+    assert principal_quads(vertices, topology, count=1).report["faces"] >= 2

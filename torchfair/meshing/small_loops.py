@@ -1,0 +1,48 @@
+"""Boundary loops that are too short for a mesh to go around them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..fields.frames import Floats
+from .surface import DesignSurface
+
+_SHORTEST = 3.0  # spacings: with two, triangles went around the tip of a cone; cells of less collapse
+
+
+class SmallLoop(NamedTuple):
+    """A boundary loop, as of a hole.
+
+    Attributes:
+        length: of its edges.
+        vertex: number of one of its vertices in the mesh that was given, -1 if none was given.
+        place: (3,) where that is.
+    """
+
+    length: float
+    vertex: int
+    place: Floats
+
+    def remedy(self, spacing: float) -> str:
+        """What is wrong with edges of a length, and what to do, in words."""
+        times = (_SHORTEST * spacing / self.length) ** 2
+        return (
+            f"the boundary loop (hole) there is {self.length:.3g} long, edges are to be {spacing:.3g}: close it, or "
+            f"ask for edges of {self.length / _SHORTEST:.3g} or less, which are about {times:.2g} times as many faces"
+        )
+
+
+def small_loop(surface: DesignSurface, spacing: float) -> SmallLoop | None:
+    """The shortest boundary loop of a surface, if it is shorter than three edges of a length; else None."""
+    loops = [loop.numpy() for loop in surface.topology.boundary_loops()]
+    points = surface.vertices.numpy()
+    lengths = [float(np.linalg.norm(points[np.roll(loop, -1)] - points[loop], axis=1).sum()) for loop in loops]
+    if not lengths or min(lengths) >= _SHORTEST * spacing:
+        return None
+    loop = loops[int(np.argmin(lengths))]
+    numbers = surface.numbers.numpy()[loop]
+    given = numbers >= 0
+    vertex = loop[given][numbers[given].argmin()] if given.any() else loop[0]
+    return SmallLoop(min(lengths), int(surface.numbers[vertex]), points[vertex])
