@@ -17,7 +17,8 @@ from torchfair.meshing.attempt import FailedAttemptError, Plan
 from torchfair.meshing.components import read_surface
 from torchfair.meshing.cut_graph import CutGraph, cut_open
 from torchfair.meshing.ladder import Again, NoMeshError, mesh_component
-from torchfair.meshing.lattice import SQUARES, triangle_lattice
+from torchfair.meshing.lattice import SQUARES, Lattice, triangle_lattice
+from torchfair.meshing.plans import plans
 from torchfair.meshing.relaxation import loosened, stretched
 from torchfair.meshing.separation import gaps, separate_vectors
 from torchfair.shapes import PrincipalParaboloid, Torus
@@ -95,12 +96,39 @@ def test_vectors_that_let_singular_points_coincide_are_avoided() -> None:
 
 
 def test_a_search_can_begin_with_a_later_plan() -> None:
-    surface = read_surface(*irregular(Torus(), 600), MeshingSettings())
-    given = surface.parts[0], surface.fields[0], SQUARES, 0.5, 0.25, MeshingSettings()
+    surface = read_surface(*irregular(PrincipalParaboloid(), 600), MeshingSettings())
+    given = surface.parts[0], surface.fields[0], SQUARES, 0.3, 0.25, MeshingSettings()
     _, words, plan = mesh_component(*given)
     assert (words, plan) == ("", 0)
-    _, words, plan = mesh_component(*given, Again(1, 0.5))
+    _, words, plan = mesh_component(*given, Again(1, 0.3))
     assert (words, plan) == ("boundary not aligned", 1)
+
+
+@pytest.mark.parametrize("lattice", [SQUARES, triangle_lattice(1.0)])
+def test_where_there_is_no_boundary_nothing_is_tried_with_and_without_aligning_to_it(
+    lattice: Lattice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both are the same mesh, as of a torus here."""
+    surface = read_surface(*irregular(Torus(), 600), MeshingSettings())
+    given = surface.parts[0], surface.fields[0], lattice, 0.5, 0.25
+    meshes = [mesh_component(*given, MeshingSettings(align_boundary=align))[0] for align in (True, False)]
+    assert len({(len(mesh.faces), mesh.positions.tobytes()) for mesh in meshes}) == 1
+    for bounded, aligned in ((False, {False}), (True, {False, True})):
+        rungs = list(plans(0.5, 0.25, MeshingSettings(), rows=lattice.has_rows, bounded=bounded))
+        assert {rung.plan.align for rung in rungs} == aligned
+        assert any("boundary" in rung.words for rung in rungs) == bounded
+    tried: list[bool] = []
+
+    def fails(*given: Any) -> None:
+        tried.append(given[4].align)
+        raise FailedAttemptError("no")
+
+    monkeypatch.setattr(ladder, "attempt", fails)
+    with pytest.raises(NoMeshError):
+        mesh_component(*given, MeshingSettings())
+    assert set(tried) == {False}
+    creased = list(plans(0.5, 0.25, MeshingSettings(), creased=True, bounded=False))
+    assert {(rung.plan.creases, rung.plan.align) for rung in creased} == {(True, True), (True, False), (False, False)}
 
 
 def test_with_another_spacing_only_plans_of_the_same_size_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -82,7 +82,8 @@ def mesh_component(
     resolution = spacing if again is None else again.resolution
     pose = surface.pose
     prepared = _Prepared(surface, directions, lattice, settings, pose.length(resolution))
-    rungs = list(plans(pose.length(spacing), smoothing, settings, bool(surface.sharp.any()), lattice.has_rows))
+    creased, bounded = bool(surface.sharp.any()), surface.topology.num_interior_edges < surface.topology.num_edges
+    rungs = list(plans(pose.length(spacing), smoothing, settings, creased, lattice.has_rows, bounded))
     began = time.process_time()
     failures: list[FailedAttemptError] = []
     hopeless: set[Kind] = set()

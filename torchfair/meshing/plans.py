@@ -42,7 +42,12 @@ class Rung(NamedTuple):
 
 
 def plans(
-    spacing: float, smoothing: float, settings: MeshingSettings, creased: bool = False, rows: bool = False
+    spacing: float,
+    smoothing: float,
+    settings: MeshingSettings,
+    creased: bool = False,
+    rows: bool = False,
+    bounded: bool = True,
 ) -> Iterator[Rung]:
     """What is tried, one after the other; without the creases at last, where there are any.
 
@@ -52,9 +57,10 @@ def plans(
         settings: of the mesh.
         creased: whether there are creases.
         rows: whether the lattice has rows, which may follow either of two principal directions.
+        bounded: whether there is a boundary; without one there is nothing to align to but creases.
     """
     for kept in (True, False) if creased else (False,):
-        can_align = settings.align_boundary or kept
+        can_align = (settings.align_boundary and bounded) or kept
         curves = "boundary and creases" if kept else "boundary"
         for scale in SCALES:
             for number, (smoother, even) in enumerate(_ROWS if rows else [(of, 0.0) for of in _SMOOTHER]):
