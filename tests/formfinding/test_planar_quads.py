@@ -210,28 +210,31 @@ def test_who_stops_the_second_solve_gets_the_first_and_is_told_that_it_was_stopp
 
 
 @pytest.mark.parametrize(
-    ("measure", "first", "second", "taken"),
+    ("measure", "before", "first", "second", "taken"),
     [
-        ("largest_planarity", 2e-4, 3e-4, False),
-        ("largest_planarity", 3e-4, 2e-4, True),
-        ("largest_distance_relative", 0.05, 0.06, False),
-        ("largest_distance_relative", 0.01, 0.03, True),
+        ("largest_planarity", 0.0, 2e-4, 3e-4, False),
+        ("largest_planarity", 0.0, 3e-4, 2e-4, True),
+        ("largest_planarity", 1.0, 2e-4, 3e-4, False),
+        ("largest_distance_relative", 0.0, 0.05, 0.06, False),
+        ("largest_distance_relative", 0.0, 0.01, 0.03, True),
+        ("largest_distance_relative", 0.06, 0.05, 0.06, True),
+        ("largest_distance_relative", 0.06, 0.05, 0.07, False),
     ],
 )
 def test_what_turns_less_is_taken_only_where_it_is_as_planar_and_as_near(
-    saddle, monkeypatch, measure, first, second, taken
+    saddle, monkeypatch, measure, before, first, second, taken
 ):
-    """Where neither solve keeps its promises, too."""
+    """Where neither solve keeps its promises, too; as near as the mesh was before is near enough."""
     surface, mesh = saddle
     solve, solved, reports = MODULE.minimise_normal_variation, [], []
 
     def broken(*args: Any, **kwargs: Any) -> JobResult[Level]:
         job = solve(*args, **kwargs)
         level = job.levels[-1]
-        after = {**level.after, measure: second if solved else first}
+        start, after = {**level.before, measure: before}, {**level.after, measure: second if solved else first}
         solved.append(job)
         missed = [Promise("nothing", 0.0, 1.0)]
-        return replace(job, levels=[replace(level, after=after, promises=missed)])
+        return replace(job, levels=[replace(level, before=start, after=after, promises=missed)])
 
     def turn(report: dict[str, Any]) -> float:
         """Less of the second."""

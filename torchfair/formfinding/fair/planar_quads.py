@@ -53,7 +53,8 @@ def planar_quads(
     - where that keeps its promises but E ends above 1.01 C, and edges turned by at most half a degree. Directions count
       a third then, and what has less E is taken, if edges turn by at most 1 degree.
 
-    The result of a second solve is taken only where it keeps promises and limits as well as the first does.
+    The result of a second solve is taken only where it keeps promises and limits as well as the first does; vertices
+    may end as far from the surface as they were before.
 
     Args:
         mesh: from :func:`torchfair.meshing.principal_quads`.
@@ -126,8 +127,12 @@ def _has_less_energy(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
 
 
 def _is_as_good(one: JobResult[Level], other: JobResult[Level]) -> bool:
-    """Whether a job keeps its promises if another does, and ends as near the surface and as planar or within limits."""
-    limits = {"largest_distance_relative": PLANAR_QUADS.distance_limit or 0.0, "largest_planarity": PLANAR_PROMISE}
+    """Whether a job keeps its promises if another does, and ends as near the surface and as planar or within limits.
+
+    As near as vertices were at the start is near enough.
+    """
+    near = max(PLANAR_QUADS.distance_limit or 0.0, one.before["largest_distance_relative"])
+    limits = {"largest_distance_relative": near, "largest_planarity": PLANAR_PROMISE}
     return one.holds >= other.holds and all(
         one.after[name] <= max(other.after[name], limit) for name, limit in limits.items()
     )
