@@ -8,7 +8,7 @@ import re
 import pytest
 import torch
 
-from torchfair import MeshError, Topology, repair_mesh
+from torchfair import MeshError, ShapeError, Topology, repair_mesh
 from torchfair.meshing import MeshingSettings, NoMeshError, principal_quads, principal_triangles
 from torchfair.shapes import Torus, irregular_triangles
 
@@ -55,6 +55,12 @@ def test_triangles_that_share_no_vertices_are_refused_and_meshed_once_they_are_w
     assert "\n" not in str(caught.value)
     first, second, third, fourth = map(int, re.findall(r"\d+", str(caught.value).split("edges ")[2])[:4])
     assert torch.equal(apart[[first, second]], apart[[fourth, third]])
+    apart[5] = math.nan
+    with pytest.raises(MeshError, match=r"not finite numbers: 5"):
+        principal_quads(apart, topology, count=200)
+    with pytest.raises(ShapeError):
+        principal_quads(apart[1:], topology, count=200)
+    apart[5] = whole.vertices[whole.topology.triangles].reshape(-1, 3)[5]
     joined = repair_mesh(apart, topology.triangles, weld=True)
     made = principal_quads(joined.vertices, joined.topology, count=200)
     assert made.report["singular"] == {}

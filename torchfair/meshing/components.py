@@ -121,10 +121,10 @@ def read_surface(
     vertices: Tensor, topology: Topology, settings: MeshingSettings, count: int | None = None
 ) -> ReadSurface:
     """The components of a mesh with their directions. Errors as of :func:`principal_quads`, for a count of faces."""
-    parts = components_of(vertices, topology, settings.crease_angle)
     if count is not None:
         check_count("count", count, least=1)
-        check_welded(vertices, topology, len(parts), count)
+        check_welded(vertices, topology, count)
+    parts = components_of(vertices, topology, settings.crease_angle)
     found = [part.directions(settings.noise) for part in parts]
     notes = [
         f"{_name(number, len(parts))}the surface is rough: curvature fitted over {fitted.rings} rings"
