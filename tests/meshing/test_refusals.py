@@ -9,7 +9,10 @@ import pytest
 import torch
 
 from torchfair import MeshError, ShapeError, Topology, repair_mesh
-from torchfair.meshing import MeshingSettings, NoMeshError, principal_quads, principal_triangles
+from torchfair.geometry import edge_lengths
+from torchfair.meshing import MeshingSettings, NoMeshError, principal_quads, principal_triangles, surface
+from torchfair.meshing.surface import components_of
+from torchfair.meshing.welded import check_welded
 from torchfair.shapes import Torus, irregular_triangles
 
 CUT_OFF = 0.02  # radius of the hole at the tip
@@ -34,7 +37,8 @@ def test_a_hole_too_small_is_named_and_as_many_faces_as_are_said_go_around_it(sc
     said = str(caught.value)
     assert "\n" not in said
     assert 0 <= caught.value.vertex < 40
-    assert f"near vertex {caught.value.vertex} at" in said
+    place = ", ".join(f"{x:.4g}" for x in (scale * points)[caught.value.vertex].tolist())
+    assert f"near vertex {caught.value.vertex} at ({place})" in said
     length = scale * 40 * 2 * CUT_OFF * math.sin(math.pi / 40)
     assert f"(hole) there is {length:.3g} long" in said
     assert f"edges of {length / 3:.3g} or less" in said
@@ -65,6 +69,29 @@ def test_triangles_that_share_no_vertices_are_refused_and_meshed_once_they_are_w
     made = principal_quads(joined.vertices, joined.topology, count=200)
     assert made.report["singular"] == {}
     assert abs(made.report["faces"] / 200 - 1) <= 0.15
+
+
+def test_as_many_faces_as_there_are_components_may_be_asked_for() -> None:
+    whole = irregular_triangles(Torus(), 60)
+    apart = whole.vertices[whole.topology.triangles].reshape(-1, 3)
+    topology = Topology.from_faces(torch.arange(len(apart)).reshape(-1, 3))
+    check_welded(apart, topology, topology.num_faces)
+    with pytest.raises(MeshError, match="--weld"):
+        check_welded(apart, topology, topology.num_faces - 1)
+
+
+def test_triangles_are_cut_for_edges_of_half_their_size_until_there_are_too_many(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole = irregular_triangles(Torus(), 60)
+    (part,) = components_of(whole.vertices, whole.topology)
+    length = float(edge_lengths(whole.vertices, whole.topology).mean())
+    assert part.is_cut_for(length / 2)
+    assert not part.is_cut_for(10 * length)
+    monkeypatch.setattr(surface, "_MOST_FACES", 4 * whole.topology.num_faces)
+    assert part.is_cut_for(length / 2)
+    monkeypatch.setattr(surface, "_MOST_FACES", 4 * whole.topology.num_faces - 1)
+    assert not part.is_cut_for(length / 2)
 
 
 def test_more_components_than_faces_are_meshed_where_nothing_coincides() -> None:
