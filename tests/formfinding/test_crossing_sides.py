@@ -15,9 +15,11 @@ from torchfair.formfinding import FairRecipe, FairSettings, minimise_normal_vari
 from torchfair.formfinding.fair import crossing_sides as module
 from torchfair.formfinding.fair import planarity_goal
 from torchfair.formfinding.fair.crossing_sides import crossing_sides
+from torchfair.formfinding.fair.measures import fair_measures
 from torchfair.formfinding.fair.problem import FairProblem
 from torchfair.formfinding.job.pulls import Pulls
 from torchfair.geometry._polygon_sides import sides_cross
+from torchfair.normalisation import Normalisation
 
 HOUSE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.55, 1.5], [0.45, 1.5]]  # with a short ridge
 PENTAGON = Topology.from_faces([[0, 1, 2, 3, 4]])
@@ -59,6 +61,34 @@ def test_sides_that_touch_do_not_cross_and_triangles_have_none() -> None:
     touching = polygon([[0, 0], [2, 0], [2, 1], [1, 0], [0, 1]])
     assert crossing_sides(touching, PENTAGON).tolist() == [False]
     assert crossing_sides(touching, Topology.from_faces([[0, 1, 2], [0, 2, 4]], 5)).tolist() == [False, False]
+
+
+def pressed(depth: float, turn: int = 0) -> Tensor:
+    """A quad of which the last corner lies so far beyond the second side, as a share of its size, somewhere."""
+    corners = polygon([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0 + depth * math.sqrt(2), 0.4]])
+    axes = torch.linalg.qr(torch.randn(3, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(turn))).Q
+    return 100 * corners @ axes + torch.tensor([7.0, 3.0, -5.0], dtype=torch.float64)
+
+
+def test_corners_pressed_against_a_side_touch_it_whatever_rounding_says() -> None:
+    quad = Topology.from_faces([[0, 1, 2, 3]])
+    by_rounding = [bool(crossing_sides(pressed(0.0, turn), quad)) for turn in range(40)]
+    assert 5 < sum(by_rounding) < 35
+    for turn in range(40):
+        assert not crossing_sides(pressed(0.0, turn), quad, 1e-9).any()
+        assert not crossing_sides(pressed(0.9e-9, turn), quad, 1e-9).any()
+        assert crossing_sides(pressed(1.1e-9, turn), quad, 1e-9).all()
+        assert not crossing_sides(pressed(-1e-3, turn), quad, 1e-9).any()
+
+
+def test_what_is_promised_of_faces_that_cross_themselves_does_not_depend_on_rounding() -> None:
+    quad, settings = Topology.from_faces([[0, 1, 2, 3]]), FairSettings(boundary="free", smallest_area=0.1)
+    problem = FairProblem(pressed(-0.1), quad, None, Pulls(pressed(-0.1)), settings)
+    for turn in range(8):
+        measured = fair_measures(pressed(0.0, turn), pressed(-0.1, turn), problem, Normalisation.of(pressed(0.0), quad))
+        assert measured["crossing_faces"] == 0
+    measured = fair_measures(pressed(1e-6), pressed(-0.1), problem, Normalisation.of(pressed(0.0), quad))
+    assert measured["crossing_faces"] == 1
 
 
 @pytest.mark.parametrize("pairs", [1, 60, 1 << 20])

@@ -100,25 +100,52 @@ def test_where_edges_turn_too_far_directions_count_more_and_what_is_left_is_said
 
 
 @pytest.mark.parametrize(
-    ("ratio", "turn", "holds", "follows"),
+    ("ratio", "turn", "holds", "warp", "follows", "is_better"),
     [
-        (1.011, 0.5, True, "_SOFTER"),
-        (1.011, -0.3, True, "_SOFTER"),
-        (1.009, 0.2, True, None),
-        (None, 0.0, True, None),  # a flat surface
-        (1.011, 0.6, True, None),
-        (1.011, 0.2, False, None),  # what is not planar would not become so
-        (1.011, 1.1, True, "_STIFFER"),
-        (0.9, 1.1, False, "_STIFFER"),
+        (1.011, 0.5, True, 1e-5, "_SOFTER", "_has_less_energy"),
+        (1.011, -0.3, True, 1e-5, "_SOFTER", "_has_less_energy"),
+        (1.009, 0.2, True, 1e-5, None, ""),
+        (None, 0.0, True, 0.0, None, ""),  # a flat surface
+        (1.011, 0.6, True, 1e-5, None, ""),
+        (1.011, 0.2, False, 0.011, None, ""),  # what is far from planar would not become so
+        (1.011, 1.1, True, 1e-4, "_STIFFER", "_turns_less"),
+        (0.9, 1.1, False, 0.011, "_STIFFER", "_turns_less"),
+        (0.9, 1.1, False, 0.01, "_SOFTER", "_is_planar"),
+        (0.9, 0.7, False, 1.1e-4, "_SOFTER", "_is_planar"),
+        (None, 0.0, False, 0.003, "_SOFTER", "_is_planar"),
     ],
 )
-def test_what_follows_the_first_solve(ratio, turn, holds, follows):
+def test_what_follows_the_first_solve(ratio, turn, holds, warp, follows, is_better):
     report = {
         "variation_over_curvature": ratio,
         "angle_mean_degrees": 1.0 + turn,
+        "planarity_max": warp,
         "before_planar": {"angle_mean_degrees": 1.0},
     }
-    assert MODULE._again(report, holds=holds) is (None if follows is None else getattr(MODULE, follows))
+    found = MODULE._again(report, holds=holds)
+    if follows is None:
+        assert found is None
+    else:
+        settings, better = found
+        assert settings is getattr(MODULE, follows)
+        assert better is getattr(MODULE, is_better)
+
+
+@pytest.mark.parametrize(("second", "taken"), [(9e-5, True), (1.1e-4, False)])
+def test_where_panels_are_nearly_planar_directions_count_less_and_what_is_planar_is_taken(
+    saddle, asked, monkeypatch, second, taken
+):
+    """Though not where it is not, whatever else is better."""
+    surface, mesh = saddle
+    warps = iter([3e-3, second])
+
+    def measured(vertices: Tensor, of: QuadMesh) -> dict[str, Any]:
+        return {**measure_mesh_on(vertices, of), "planarity_max": next(warps)}
+
+    monkeypatch.setattr("torchfair.meshing.measure_mesh_on", measured)
+    made, _ = planar_quads(mesh, surface)
+    assert asked == [MODULE.PLANAR_QUADS, MODULE._SOFTER]
+    assert made.report["planarity_max"] == (second if taken else 3e-3)
 
 
 def test_directions_count_less_where_e_is_above_c(saddle, asked, monkeypatch):

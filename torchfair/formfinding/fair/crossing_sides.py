@@ -12,7 +12,7 @@ from ...topology import Topology
 _PAIRS = 1 << 20  # of sides that are looked at together
 
 
-def crossing_sides(vertices: Tensor, topology: Topology) -> Tensor:
+def crossing_sides(vertices: Tensor, topology: Topology, touching: float = 0.0) -> Tensor:
     """(F,) bool, whether two sides of a face cross, seen along its area vector.
 
     The area vector of such a face may look the same way as ever, and all its corners have good angles: a pentagon
@@ -21,6 +21,7 @@ def crossing_sides(vertices: Tensor, topology: Topology) -> Tensor:
     Args:
         vertices: (V, 3) positions, any length unit.
         topology: connectivity; any polygons.
+        touching: Corners as near the line of a side as this share of the size of their face only touch it.
     """
     crossing = torch.zeros(topology.num_faces, dtype=torch.bool)
     places, normals = (part.detach().cpu() for part in (vertices, face_area_vectors(vertices, topology)))
@@ -29,5 +30,5 @@ def crossing_sides(vertices: Tensor, topology: Topology) -> Tensor:
             continue
         faces, corners = (torch.split(part.cpu(), _PAIRS // size**2 + 1) for part in parts)
         for some, of in zip(faces, corners, strict=True):
-            crossing[some] = torch.from_numpy(sides_cross(places[of].numpy(), normals[some].numpy()))
+            crossing[some] = torch.from_numpy(sides_cross(places[of].numpy(), normals[some].numpy(), touching))
     return crossing.to(vertices.device)

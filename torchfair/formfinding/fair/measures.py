@@ -25,6 +25,7 @@ _EDGES = "mean edges"
 _KEPT_AREA = 0.9  # of that of a sheet with a free boundary
 _FREER = "let the boundary glide or be free, raise distance_limit, or choose fewer faces"
 _OF_PANELS = "planarity of kept faces"
+_TOUCHING = 1e-9  # of the size of a face: corners pressed against a side are off it by rounding
 FLAT_PROMISE = 0.02  # degrees between the faces at edges that are kept flat
 
 
@@ -40,11 +41,11 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         from the nearer of both; ``largest_distance_back`` from vertices of the reference surface to this one,
         and ``largest_distance_back_relative``; ``largest_boundary_distance`` of gliding vertices from their
         curve. ``smallest_angle_degrees``; ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces``
-        against the start, ``crossing_faces``, whose sides cross, ``smallest_edge_ratio`` of the sides of polygons,
-        ``largest_growth`` against the larger of a face's own area and half the mean. ``largest_planarity`` of the
-        faces kept planar and ``largest_planarity_of_all`` polygons (diagonal distance over mean edge of the face),
-        ``largest_planarity_growth`` of those that are nearly planar. ``largest_fold_degrees`` of the edges kept
-        flat. ``largest_handle_distance``.
+        against the start, ``crossing_faces``, whose sides cross by more than rounding, ``smallest_edge_ratio`` of the
+        sides of polygons, ``largest_growth`` against the larger of a face's own area and half the mean.
+        ``largest_planarity`` of the faces kept planar and ``largest_planarity_of_all`` polygons (diagonal distance over
+        mean edge of the face), ``largest_planarity_growth`` of those that are nearly planar. ``largest_fold_degrees``
+        of the edges kept flat. ``largest_handle_distance``.
     """
     topology = problem.topology
     normalised = unit.apply(vertices)
@@ -86,7 +87,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "smallest_edge_ratio": float(sides.min()) if sides.numel() else 1.0,
         "shortest_edge": float(lengths.min()),
         "flipped_faces": int((turned <= 0.0).sum()),
-        "crossing_faces": int(crossing_sides(vertices, topology).sum()),
+        "crossing_faces": int(crossing_sides(vertices, topology, _TOUCHING).sum()),
         "largest_planarity": _largest(warps[problem.panels.planar]),
         "largest_planarity_of_all": _largest(warps[topology.face_sizes > 3]),
         "largest_planarity_growth": max(0.0, _largest(problem.panels.nearly.growth(warps))),

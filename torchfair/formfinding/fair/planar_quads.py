@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ...meshing import QuadMesh
 
     _Solved = tuple[JobResult[Level], dict[str, Any]]
+    _IsBetter = Callable[[Mapping[str, Any], Mapping[str, Any]], bool]  # than the first solve, by reports
 
 PLANAR_QUADS = FairSettings(
     planar="quads",
@@ -39,6 +40,7 @@ _STIFFER = replace(PLANAR_QUADS, direction_weight=3000.0)
 _LITTLE = 0.5  # degrees in the mean, up to which edges may turn farther for less E
 _LEAST = 1.01  # E over C, beyond which they do
 _SOFTER = replace(PLANAR_QUADS, direction_weight=100.0)
+_NEARLY = 0.01  # planarity in mean edges of a face, from which other settings may make panels planar
 
 
 def planar_quads(
@@ -48,6 +50,8 @@ def planar_quads(
 
     Lowers E under ``PLANAR_QUADS``; what `torchfair mesh --planar` does. There is a second solve from the same start:
 
+    - where panels are nearly planar, to 0.01, but not planar. Directions count a third then, and what is planar is
+      taken;
     - where that turns edges away from principal directions by more than 1 degree in the mean. Directions count ten
       times then, and what turns edges less is taken;
     - where that keeps its promises but E ends above 1.01 C, and edges turned by at most half a degree. Directions count
@@ -98,8 +102,8 @@ def planar_quads(
     job, report = solved(PLANAR_QUADS)
     again = None if job.stopped else _again(report, holds=job.holds)
     if again is not None:
-        other = solved(again)
-        is_better = _turns_less if again is _STIFFER else _has_less_energy
+        settings, is_better = again
+        other = solved(settings)
         if _is_as_good(other[0], job) and is_better(other[1], report):
             job, report = other
         elif other[0].stopped:
@@ -109,12 +113,20 @@ def planar_quads(
     return replace(mesh, vertices=job.vertices, report=report, notes=said), job
 
 
-def _again(report: Mapping[str, Any], *, holds: bool) -> FairSettings | None:
-    """The settings of a second solve after one with such a report; None where that was enough."""
+def _again(report: Mapping[str, Any], *, holds: bool) -> tuple[FairSettings, _IsBetter] | None:
+    """The settings of a second solve after one with such a report, and when it is better; None if that was enough."""
     turn, ratio = _turn(report), report["variation_over_curvature"]
+    if PLANAR_PROMISE < report["planarity_max"] <= _NEARLY:
+        return _SOFTER, _is_planar
     if turn > _TURNED:
-        return _STIFFER
-    return _SOFTER if holds and turn <= _LITTLE and ratio is not None and ratio > _LEAST else None
+        return _STIFFER, _turns_less
+    if holds and turn <= _LITTLE and ratio is not None and ratio > _LEAST:
+        return _SOFTER, _has_less_energy
+    return None
+
+
+def _is_planar(one: Mapping[str, Any], _other: Mapping[str, Any]) -> bool:
+    return bool(one["planarity_max"] <= PLANAR_PROMISE)
 
 
 def _turns_less(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
