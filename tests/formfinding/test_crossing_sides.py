@@ -145,7 +145,7 @@ def test_once_sides_cross_after_a_stage_all_is_done_anew_with_none_that_cross(fi
             recipe.problem.notes.append("what it cost")
             planarity.distance, planarity.most_warped = 9.0, 0.1 if warped else math.inf
         plan.state = {"vertices": crossed if len(allowed) - 1 == first else begin}
-    again = (1 if warped else 3) if first < 3 else 0
+    again = (1 if warped and first else 3) if first < 3 else 0  # after the first that one is done again, and the others
     assert allowed == [True] * min(first + 1, 3) + [False] * again
     assert torch.equal(plan.state["vertices"], begin)
     assert not recipe.problem.admits({"vertices": begin}, {"vertices": crossed})
@@ -153,6 +153,33 @@ def test_once_sides_cross_after_a_stage_all_is_done_anew_with_none_that_cross(fi
         assert torch.equal(begun[first + 1], begin)
         assert recipe.problem.notes == notes
         assert planarity.distance == 0.0
+
+
+@pytest.mark.parametrize("first", [0, 2, 3])
+def test_the_first_stage_after_which_sides_cross_is_done_again_alone(first: int) -> None:
+    """As all would be from the start: no step of those before was another."""
+    recipe = house_recipe()
+    begin, crossed = recipe.start, recipe.unit.apply(polygon(ridge_reversed()))
+    notes, planarity = list(recipe.problem.notes), recipe.problem.planarity
+    plan = recipe.plan(recipe.state())
+    stages, states = [], []
+    for number, stage in enumerate(plan.stages()):
+        stages.append(stage)
+        states.append(plan.state["vertices"])
+        assert recipe.problem.sides_may_cross == (number <= first)
+        if number in (first, first + 1):
+            recipe.problem.notes.append("what it cost")
+            assert planarity.distance == 0.0
+            planarity.distance = 9.0
+        plan.state = {"vertices": crossed if number == first else begin + 0.001 * (number + 1)}
+    again = first < 3
+    assert len(stages) == 3 + again
+    if again:
+        assert stages[first + 1] is stages[first]
+        assert torch.equal(states[first + 1], states[first])
+        assert recipe.problem.notes == [*notes, "what it cost"]
+        assert stages[-1].guard is not None
+        assert not stages[-1].guard({"vertices": begin}, {"vertices": crossed})
 
 
 def test_no_start_where_planes_meet_has_sides_that_cross(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -52,29 +53,45 @@ class FairPlan(Plan):
         self._problem = problem
 
     def stages(self) -> Stages:
-        """All stages; from the start with no step after which sides of faces cross, once one ends with such faces.
+        """All stages; once one ends with faces whose sides cross, it is done again with no step after which they do.
 
         Within a stage they may cross, as where vertices that glide along the boundary pass each other and come back.
-        Faces that cannot become planar even so are not tried again.
+        Where some have in a stage before, all is done again from the start. Faces that cannot become planar even so are
+        not tried again.
         """
         problem, start = self._problem, self.state["vertices"]
-        put_back, notes, crossed = problem.snapshot(), len(problem.notes), False
+        put_back, crossed = self._snapshot(), False
         problem.sides_may_cross = not problem.settings.projection.takes_every_step
+        problem.sides_have_crossed = False
         try:
             for stage in self._solved():
+                anew, had_crossed = self._snapshot(), problem.sides_have_crossed
                 yield stage
                 crossed = problem.sides_may_cross and problem.crosses_sides(self.state["vertices"])
-                if crossed:
+                if crossed and had_crossed:
                     break
+                if crossed:
+                    problem.sides_may_cross = False
+                    anew()
+                    yield stage
         finally:
             problem.sides_may_cross = False
-        if crossed:
+        if crossed and had_crossed:
             are_warped = problem.planarity.most_warped < math.inf
             put_back()
-            del problem.notes[notes:]
-            self.state = problem.blocks(start)
             warp = problem.planarity.largest_warp(start)
             yield from self._not_warped_more(warp) if are_warped else self._solved()
+
+    def _snapshot(self) -> Callable[[], None]:
+        """A function that puts back the state and what was decided since then."""
+        state, notes, put_back_problem = self.state, len(self._problem.notes), self._problem.snapshot()
+
+        def put_back() -> None:
+            self.state = state
+            put_back_problem()
+            del self._problem.notes[notes:]
+
+        return put_back
 
     def _solved(self) -> Stages:
         """All portions; where that leaves faces warped or raises E much, faces are made planar first, E lowered then.

@@ -63,6 +63,7 @@ class FairProblem:
         loose: (V,) bool, corners of boundary and creases that become planar faces may take along.
         planarity: Planar faces as a goal, and what they may cost.
         sides_may_cross: Whether steps may lead where sides of faces cross, because the end is looked at.
+        sides_have_crossed: Whether a step was looked at that leads there.
         boundary: Curves on which vertices of the boundary and of creases glide; None if none do.
         notes: Decisions taken, in words.
     """
@@ -94,7 +95,8 @@ class FairProblem:
         self.panels = Panels(vertices, topology, settings, self.notes)
         self.loose = self._loose_corners()
         self.boundary = self._gliding_boundary()
-        self.planarity, self.sides_may_cross = PlanarityGoal(self), False
+        self.planarity = PlanarityGoal(self)
+        self.sides_may_cross = self.sides_have_crossed = False
         self.near = self._nearness(reference or (vertices, topology), surface)
 
     def _nearness(self, reference: GivenReference, surface: Reference | None = None) -> Nearness:
@@ -258,8 +260,12 @@ class FairProblem:
 
     def keeps_faces(self, state: State, trial: State) -> bool:
         """Whether a step leaves faces as good as they have to be, and crosses no sides unless they may on the way."""
-        kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
-        return kept and (self.sides_may_cross or self.guard.keeps_sides_apart(state, trial))
+        if not (self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)):
+            return False
+        if self.guard.keeps_sides_apart(state, trial):
+            return True
+        self.sides_have_crossed = True
+        return self.sides_may_cross
 
     def crosses_sides(self, vertices: Tensor) -> bool:
         """Whether sides of faces of ``vertices`` (V, 3) cross that do not at the start."""
