@@ -40,6 +40,7 @@ _STIFFER = replace(PLANAR_QUADS, direction_weight=3000.0)
 _LITTLE = 0.5  # degrees in the mean, up to which edges may turn farther for less E
 _LEAST = 1.01  # E over C, beyond which they do
 _SOFTER = replace(PLANAR_QUADS, direction_weight=100.0)
+_OTHER = replace(PLANAR_QUADS, direction_weight=200.0)
 _NEARLY = 0.01  # planarity in mean edges of a face, from which other settings may make panels planar
 
 
@@ -50,8 +51,8 @@ def planar_quads(
 
     Lowers E under ``PLANAR_QUADS``; what `torchfair mesh --planar` does. There is a second solve from the same start:
 
-    - where panels are nearly planar, to 0.01, but not planar. Directions count a third then, and what is planar is
-      taken;
+    - where panels are nearly planar, to 0.01, but not planar. Directions count two thirds then, and what is planar
+      is taken;
     - where that turns edges away from principal directions by more than 1 degree in the mean. Directions count ten
       times then, and what turns edges less is taken;
     - where that keeps its promises but E ends above 1.01 C, and edges turned by at most half a degree. Directions count
@@ -117,7 +118,7 @@ def _again(report: Mapping[str, Any], *, holds: bool) -> tuple[FairSettings, _Is
     """The settings of a second solve after one with such a report, and when it is better; None if that was enough."""
     turn, ratio = _turn(report), report["variation_over_curvature"]
     if PLANAR_PROMISE < report["planarity_max"] <= _NEARLY:
-        return _SOFTER, _is_planar
+        return _OTHER, _is_planar
     if turn > _TURNED:
         return _STIFFER, _turns_less
     if holds and turn <= _LITTLE and ratio is not None and ratio > _LEAST:
