@@ -110,9 +110,9 @@ def test_where_edges_turn_too_far_directions_count_more_and_what_is_left_is_said
         (1.011, 0.2, False, 0.011, None, ""),  # what is far from planar would not become so
         (1.011, 1.1, True, 1e-4, "_STIFFER", "_turns_less"),
         (0.9, 1.1, False, 0.011, "_STIFFER", "_turns_less"),
-        (0.9, 1.1, False, 0.01, "_OTHER", "_is_planar"),
-        (0.9, 0.7, False, 1.1e-4, "_OTHER", "_is_planar"),
-        (None, 0.0, False, 0.003, "_OTHER", "_is_planar"),
+        (0.9, 1.1, False, 0.01, "_LITTLE_SOFTER", "_is_planar"),
+        (0.9, 0.7, False, 1.1e-4, "_LITTLE_SOFTER", "_is_planar"),
+        (None, 0.0, False, 0.003, "_LITTLE_SOFTER", "_is_planar"),
     ],
 )
 def test_what_follows_the_first_solve(ratio, turn, holds, warp, follows, is_better):
@@ -144,7 +144,7 @@ def test_where_panels_are_nearly_planar_directions_count_two_thirds_and_what_is_
 
     monkeypatch.setattr("torchfair.meshing.measure_mesh_on", measured)
     made, _ = planar_quads(mesh, surface)
-    assert asked == [MODULE.PLANAR_QUADS, MODULE._OTHER]
+    assert asked == [MODULE.PLANAR_QUADS, MODULE._LITTLE_SOFTER]
     assert made.report["planarity_max"] == (second if taken else 3e-3)
 
 

@@ -10,7 +10,7 @@ from .._remembered import remembered
 from ..topology import Topology
 from ._any_size import of_any_size
 from ._ops import cross, dot, gather, norm
-from .normals import face_normals
+from .normals import face_normals, normals_beside
 
 
 @remembered
@@ -64,9 +64,9 @@ def _sine_and_cosine(vertices: Tensor, normals: Tensor, topology: Topology, part
     """Those (*batch, n) of some interior edges, with the normals (*batch, F, 3): temporaries stay in the cache."""
     v, w = topology.edges[: topology.num_interior_edges][part].unbind(1)
     edges = gather(vertices, w) - gather(vertices, v)
-    left, right = (gather(normals, faces) for faces in topology.interior_edge_faces[part].unbind(1))
+    left, right, valid = normals_beside(normals, topology.interior_edge_faces[part])
     lengths = norm(edges)
-    valid = (left != 0).any(-1) & (right != 0).any(-1) & (lengths > 0)
+    valid = valid & (lengths > 0)
     axis = cross(left, right)
     sine = dot(axis, edges) / torch.where(valid, lengths, 1.0)
     if not topology.is_triangular:

@@ -138,10 +138,12 @@ def adjacent_normals(vertices: Tensor, topology: Topology) -> tuple[Tensor, Tens
         >>> left, right
         (tensor([[ 0.0000, -0.4472,  0.8944]]), tensor([[0.0000, 0.4472, 0.8944]]))
     """
-    normals = face_normals(vertices, topology)
-    left_faces, right_faces = topology.interior_edge_faces.unbind(1)
-    left = normals.index_select(-2, left_faces)
-    right = normals.index_select(-2, right_faces)
+    return normals_beside(face_normals(vertices, topology), topology.interior_edge_faces)
+
+
+def normals_beside(normals: Tensor, edge_faces: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """The same of edges between faces (n, 2), with the normals (*batch, F, 3) of faces."""
+    left, right = (gather(normals, faces) for faces in edge_faces.unbind(1))
     return left, right, (left != 0).any(-1) & (right != 0).any(-1)
 
 

@@ -138,14 +138,13 @@ def spacing_of(surface: ReadSurface, face_area: float, count: int | None, spacin
     """The spacing asked for, or that of a count of faces, each with an area over the squared spacing.
 
     Raises:
-        SettingsError: if neither or both are given, or one is out of range.
+        SettingsError: if neither or both are given, or the spacing is out of range; counts are checked before.
     """
     if (count is None) == (spacing is None):
         raise SettingsError("give either count or spacing")
     if spacing is not None:
         check_number("spacing", spacing, above=True, finite=True)
         return float(spacing)
-    check_count("count", count, least=1)
     assert count is not None
     return math.sqrt(math.fsum(part.frames.areas.sum() for part in surface.parts) / (count * face_area))
 

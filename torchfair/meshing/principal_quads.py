@@ -65,8 +65,7 @@ def principal_quads(
         ShapeError: if ``vertices`` is not one mesh that fits.
         SettingsError: if neither or both of count and spacing are given, or one is out of range.
         MeshError: if the surface has no faces, faces without area, or more components than faces asked for because
-            edges at one place are not welded; :class:`NoMeshError` if no valid mesh was
-            found, with the place.
+            edges at one place are not welded; :class:`NoMeshError` if no valid mesh was found, with the place.
 
     Example:
         >>> from torchfair.meshing import principal_quads

@@ -87,7 +87,7 @@ def visible_triangles(
         first_pixel = (picture * height + spans.row) * width + spans.start
         step = scale.index_select(0, picture)
         first_level, level_step = (spans.depth - origin.index_select(0, picture)) * step, spans.depth_step * step
-        for span, offset in span_chunks(spans):
+        for span, offset in span_chunks(spans.length):
             level = first_level.index_select(0, span) + level_step.index_select(0, span) * offset
             key = pack_keys(level, spans.triangle.index_select(0, span), bits)
             nearest.scatter_reduce_(0, first_pixel.index_select(0, span) + offset, key, "amin")

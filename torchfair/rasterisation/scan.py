@@ -107,9 +107,12 @@ def _spans(screen: _Screen, triangles: Tensor, before: int) -> Spans:
     return Spans(chosen.index_select(0, triangle) + before, row, start, stop - start, first, step)
 
 
-def span_chunks(spans: Spans) -> Iterator[tuple[Tensor, Tensor]]:
-    """Every covered pixel once, in chunks ``(span number, pixels after the start of the span)``."""
-    return run_chunks(torch.zeros_like(spans.length), spans.length, _CHUNK)
+def span_chunks(length: Tensor, begin: Tensor | None = None) -> Iterator[tuple[Tensor, Tensor]]:
+    """Every pixel of spans of some lengths (S,) once, in chunks ``(span number, pixels after the start of the span)``.
+
+    With the numbers ``begin`` (S,) of first pixels, the numbers of pixels.
+    """
+    return run_chunks(torch.zeros_like(length) if begin is None else begin, length, _CHUNK)
 
 
 def first_centre(coordinate: Tensor, size: int) -> Tensor:

@@ -10,15 +10,14 @@ from torch import Tensor
 
 from ..rasterisation.planes import SeenPlanes
 from ..rasterisation.quads import QuadSpans, parallelogram_spans
-from ..rasterisation.runs import run_chunks
+from ..rasterisation.scan import span_chunks
 from .hiding import Hiding, may_be_seen
 
 _LONGEST = 4096  # samples along one edge
 _DEPTH_SHARE = 1e-3  # of all depths, by which lines may lie behind the surface
 _PORTION = 1 << 15  # lines looked at together on a CPU: keeps temporaries near the cache
 _LARGE_PORTION = 1 << 18  # elsewhere: a large mesh would need gigabytes
-_CHUNK = 1 << 17  # pixels put at a time
-_MANY = 1 << 16  # lines from which on those that are seen or hidden as a whole are told first, by blocks of pixels
+_MANY = 1 << 16  # lines from which on those that are hidden as a whole are told first, by blocks of pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +123,8 @@ def _put_lines(top: Tensor, hiding: Hiding, lines: _Lines) -> None:
 def _put_whole(top: Tensor, shape: torch.Size, lines: _Lines) -> None:
     """The same of lines that are seen from end to end."""
     spans = _ribbons(lines, shape)
-    first_pixel = spans.row * shape[1] + spans.start
-    number = lines.numbers.index_select(0, spans.quad)
-    for span, pixel in run_chunks(first_pixel, spans.length, _CHUNK):
+    first_pixel, number = spans.row * shape[1] + spans.start, lines.numbers.index_select(0, spans.quad)
+    for span, pixel in span_chunks(spans.length, first_pixel):
         top.scatter_reduce_(0, pixel, number.index_select(0, span), "amax")
 
 
@@ -138,7 +136,7 @@ def _put_seen(top: Tensor, shape: torch.Size, lines: _Lines, samples: tuple[Tens
     sample, sample_step = _positions(lines.ends, steps, spans)
     first_sample, last_sample = first[line], (first + steps)[line]
     first_pixel, number = spans.row * shape[1] + spans.start, lines.numbers[line]
-    for span, offset in run_chunks(torch.zeros_like(spans.length), spans.length, _CHUNK):
+    for span, offset in span_chunks(spans.length):
         place = sample.index_select(0, span) + sample_step.index_select(0, span) * offset
         place = place.clamp_(min=0).to(torch.int64) + first_sample.index_select(0, span)
         place = torch.minimum(place, last_sample.index_select(0, span))

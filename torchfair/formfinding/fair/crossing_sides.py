@@ -24,6 +24,8 @@ def crossing_sides(vertices: Tensor, topology: Topology, touching: float = 0.0) 
         touching: Corners as near the line of a side as this share of the size of their face only touch it.
     """
     crossing = torch.zeros(topology.num_faces, dtype=torch.bool)
+    if topology.is_triangular:
+        return crossing.to(vertices.device)
     places, normals = (part.detach().cpu() for part in (vertices, face_area_vectors(vertices, topology)))
     for size, parts in topology.faces_by_size.items():
         if size == 3:

@@ -60,23 +60,23 @@ class FairPlan(Plan):
         not tried again.
         """
         problem, start = self._problem, self.state["vertices"]
-        put_back, crossed = self._snapshot(), False
+        put_back, from_the_start = self._snapshot(), False
         problem.sides_may_cross = not problem.settings.projection.takes_every_step
         problem.sides_have_crossed = False
         try:
             for stage in self._solved():
                 anew, had_crossed = self._snapshot(), problem.sides_have_crossed
                 yield stage
-                crossed = problem.sides_may_cross and problem.crosses_sides(self.state["vertices"])
-                if crossed and had_crossed:
+                if not (problem.sides_may_cross and problem.crosses_sides(self.state["vertices"])):
+                    continue
+                problem.sides_may_cross, from_the_start = False, had_crossed
+                if from_the_start:
                     break
-                if crossed:
-                    problem.sides_may_cross = False
-                    anew()
-                    yield stage
+                anew()
+                yield stage
         finally:
             problem.sides_may_cross = False
-        if crossed and had_crossed:
+        if from_the_start:
             are_warped = problem.planarity.most_warped < math.inf
             put_back()
             warp = problem.planarity.largest_warp(start)

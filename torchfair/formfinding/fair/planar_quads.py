@@ -40,7 +40,7 @@ _STIFFER = replace(PLANAR_QUADS, direction_weight=3000.0)
 _LITTLE = 0.5  # degrees in the mean, up to which edges may turn farther for less E
 _LEAST = 1.01  # E over C, beyond which they do
 _SOFTER = replace(PLANAR_QUADS, direction_weight=100.0)
-_OTHER = replace(PLANAR_QUADS, direction_weight=200.0)
+_LITTLE_SOFTER = replace(PLANAR_QUADS, direction_weight=200.0)
 _NEARLY = 0.01  # planarity in mean edges of a face, from which other settings may make panels planar
 
 
@@ -118,7 +118,7 @@ def _again(report: Mapping[str, Any], *, holds: bool) -> tuple[FairSettings, _Is
     """The settings of a second solve after one with such a report, and when it is better; None if that was enough."""
     turn, ratio = _turn(report), report["variation_over_curvature"]
     if PLANAR_PROMISE < report["planarity_max"] <= _NEARLY:
-        return _OTHER, _is_planar
+        return _LITTLE_SOFTER, _is_planar
     if turn > _TURNED:
         return _STIFFER, _turns_less
     if holds and turn <= _LITTLE and ratio is not None and ratio > _LEAST:

@@ -260,12 +260,11 @@ class FairProblem:
 
     def keeps_faces(self, state: State, trial: State) -> bool:
         """Whether a step leaves faces as good as they have to be, and crosses no sides unless they may on the way."""
-        if not (self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)):
-            return False
-        if self.guard.keeps_sides_apart(state, trial):
-            return True
-        self.sides_have_crossed = True
-        return self.sides_may_cross
+        kept = self.guard.keeps_faces(state, trial) and self.guard.keeps_bounds(trial)
+        if kept and not self.guard.keeps_sides_apart(state, trial):
+            self.sides_have_crossed = True
+            return self.sides_may_cross
+        return kept
 
     def crosses_sides(self, vertices: Tensor) -> bool:
         """Whether sides of faces of ``vertices`` (V, 3) cross that do not at the start."""
