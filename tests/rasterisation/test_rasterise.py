@@ -194,6 +194,17 @@ def test_triangles_are_seen_the_same_however_many_are_scanned_at_a_time(monkeypa
         assert torch.equal(torch.where(alone < 0, -1, mine[alone]), whole[number])
 
 
+def test_depths_are_told_apart_beyond_those_of_what_is_scanned_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Levels of the first triangle alone, which is level, would overflow at the others."""
+    monkeypatch.setattr(scan, "_TRIANGLES", 1)
+    points = torch.cat([rectangle(0, 0, 4, 4, depth) for depth in (0.0, 50.0, -50.0)])
+    triangles = torch.tensor([[0, 1, 2], [4, 5, 6], [8, 9, 10]])
+    seen = visible_triangles(points, triangles, 4, 4)
+    assert set(seen.unique().tolist()) == {-1, 2}
+    behind = visible_triangles(points, triangles[:2], 4, 4)
+    assert set(behind.unique().tolist()) == {-1, 0}
+
+
 def spans_one_by_one(points: Tensor, triangles: Tensor, width: int, height: int) -> list[tuple[int, int, int, int]]:
     """Triangle, row, first pixel and length of all runs, by crossings of the three edges at every row."""
     found = []

@@ -95,6 +95,24 @@ def test_edge_order_decides_what_is_on_top() -> None:
     assert torch.equal(up, mesh.paint(white, edges=EdgeStyle(colors, 3.0)))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_of_lines_that_overlap_the_one_with_the_largest_order_is_on_top_whatever_the_order(seed: int) -> None:
+    """As of the lines that cover a pixel when each is drawn alone."""
+    vertices, topology = plate(8, 4)
+    mesh, white = MeshView(vertices, topology, *FRONTAL, supersampling=1), torch.ones(2, 3)
+    count = topology.num_edges
+    colors, nothing = torch.linspace(0.1, 0.9, count)[:, None].expand(count, 3), torch.zeros(count)
+    order = torch.randperm(count, generator=torch.Generator().manual_seed(seed)) * 3 - 5
+    alone = [nothing.index_fill(0, torch.tensor(edge), 3.0) for edge in range(count)]
+    pictures = [mesh.paint(white, edges=EdgeStyle(torch.zeros(3), widths)) for widths in alone]
+    covered = torch.stack(pictures)[..., 0] < 1
+    assert int(covered.sum(0).max()) >= 3
+    on_top = torch.where(covered, order[:, None, None], order.min() - 1).argmax(0)
+    expected = torch.where(covered.any(0), colors[on_top, 0], torch.ones(()))
+    picture = mesh.paint(white, edges=EdgeStyle(colors, 3.0, order))
+    assert torch.allclose(picture[..., 0], expected)
+
+
 def test_the_same_mesh_gives_the_same_picture() -> None:
     vertices, topology = wavy_grid()
     camera, size = fit_camera(vertices, towards_eye=ASLANT, up=UP, width=80, height=60)
