@@ -291,6 +291,7 @@ def test_panels_that_cannot_become_planar_are_named_and_the_exit_code_is_1(
     assert main([*command, "--boundary", "fixed"]) == 1
     out = capsys.readouterr().out
     assert "NOT REACHED; 1 of 1: faces 1 (line 5) (" in out
+    assert "raise --distance, or choose fewer faces" in out  # the option, not the field of the library
     assert "are kept planar" not in out
     assert torch.equal(load_mesh(output).vertices, load_mesh(path).vertices)
 

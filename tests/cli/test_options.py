@@ -95,7 +95,9 @@ def test_help_says_the_default_in_the_unit_that_is_typed(command: JobCommand) ->
     for name, option in command.options().names.items():
         field = fields_of(command.settings())[name]
         if field.is_switch:
-            assert f"--{option}, --no-{option} {field.help[0]}" in text
+            switched = f"--{option}, --no-{option} {field.help[0]}"
+            assert switched in text
+            assert f"(default {field.show(field.default)})" in text.partition(switched)[2].partition(" --")[0], option
             continue
         assert f"--{option} {field.symbol}" in text
         shown = f"{math.degrees(field.default):g} degrees" if field.unit == "radians" else field.show(field.default)

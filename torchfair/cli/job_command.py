@@ -132,7 +132,7 @@ class JobCommand(ABC):
             *work_lines(result),
             *outputs.lines(),
         ]
-        outputs.finish(request, result, lines, missed)
+        outputs.finish(request, result, lines, [self.options().in_options(line) for line in missed])
         return exit_code(result.projection.status, missed, interrupted=request.interrupted)
 
     def _solver(self, request: Request, settings: Any, *, quiet: bool) -> Callable[[], JobResult[Any]]:

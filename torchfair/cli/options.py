@@ -115,7 +115,7 @@ class SettingOptions(Generic[S]):
         try:
             return with_fields(basis, _given(arguments))
         except SettingsError as error:
-            raise CommandError(self._in_options(str(error))) from None
+            raise CommandError(self.in_options(str(error))) from None
 
     def asked(self, arguments: argparse.Namespace) -> Collection[str]:
         """Fields that options, the file or the preset name; a preset names all of them."""
@@ -126,7 +126,7 @@ class SettingOptions(Generic[S]):
         file = arguments.settings
         return {*_given(arguments), *(() if file is None else read_fields(file, self._kind, job=self._job))}
 
-    def _in_options(self, words: str) -> str:
+    def in_options(self, words: str) -> str:
         """What the library says of fields, with the options that give them in their place."""
         for name, option in self.names.items():
             field = name.rpartition(".")[2]
@@ -155,7 +155,7 @@ def option_help(field: SettingField) -> str:
     text = field.help.replace(", radians", "")
     unit = {"radians": " degrees", "": ""}.get(field.unit, f" {field.unit}")
     shown = field.show(field.default)
-    default = "" if field.is_switch else f" (default {shown}{'' if shown == 'none' else unit})"
+    default = f" (default {shown}{'' if shown == 'none' else unit})"
     return (text.rstrip(".") + default).replace("%", "%%")
 
 

@@ -207,8 +207,8 @@ def _words(error: Exception) -> str:
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Adds the options that say where they go."""
     add = parser.add_argument
-    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF, PLY, STL, GLB or 3DM), "
-        "or a folder; what belongs to it is named after it: NAME.report.json and others")  # fmt: skip
+    add("-o", "--output", required=True, metavar="OUTPUT", help="mesh file to write (OBJ, OFF, PLY, STL, GLB, 3DM or "
+        "DXF), or a folder; what belongs to it is named after it: NAME.report.json and others")  # fmt: skip
     add("--results", metavar="FOLDER", help="folder of NAME.report.json and all else (default: that of OUTPUT)")
     add("--no-pictures", action="store_true", help="write no pictures")
     add_views(parser)
