@@ -14,7 +14,8 @@ from torchfair import Topology
 from torchfair.fields import Directions
 from torchfair.meshing import MeshingSettings, counts, principal_quads
 from torchfair.meshing.counts import mesh_to_count, next_spacing
-from torchfair.meshing.ladder import Again, NoMeshError
+from torchfair.meshing.ladder import Again
+from torchfair.meshing.no_mesh import NoMeshError
 from torchfair.meshing.surface import DesignSurface
 from torchfair.shapes import example_roof
 

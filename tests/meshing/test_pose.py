@@ -19,13 +19,14 @@ from torchfair.meshing import (
     NoMeshError,
     QuadMesh,
     TriangleMesh,
-    ladder,
+    prepared,
     principal_quads,
     principal_triangles,
 )
-from torchfair.meshing.attempt import FailedAttemptError, PieceMesh
 from torchfair.meshing.components import read_surface
+from torchfair.meshing.failed_attempt import FailedAttemptError
 from torchfair.meshing.numbering import numbered_by_geometry
+from torchfair.meshing.piece_mesh import PieceMesh
 from torchfair.meshing.pose import Pose
 from torchfair.meshing.row_distances import row_distance
 from torchfair.meshing.surface import DesignSurface, components_of
@@ -132,7 +133,7 @@ def test_rows_are_as_far_apart_to_the_last_bit_after_motions() -> None:
 def test_places_are_told_where_the_surface_is(failures: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """In notes on creases that are lines no more, and where nothing was found: they are known in the pose."""
     vertices, topology = moved(SHAPES["box"], 4, 10.0)
-    settings, attempt, left = MeshingSettings(crease_angle=0.5), ladder.attempt, [failures]
+    settings, attempt, left = MeshingSettings(crease_angle=0.5), prepared.attempt, [failures]
     first = part_of((vertices, topology)).vertices[0]
 
     def failing(surface: DesignSurface, *others: Any) -> PieceMesh:
@@ -141,7 +142,7 @@ def test_places_are_told_where_the_surface_is(failures: int, monkeypatch: pytest
             raise FailedAttemptError("no room", 0, surface.vertices[0].numpy())
         return attempt(surface, *others)
 
-    monkeypatch.setattr(ladder, "attempt", failing)
+    monkeypatch.setattr(prepared, "attempt", failing)
     try:
         told = " ".join(principal_quads(vertices, topology, count=150, settings=settings).notes)
         assert "creases not aligned near (" in told

@@ -12,12 +12,14 @@ from meshing_tools import Flat, cut, ellipsoid, irregular, problem_of
 from torchfair import MeshError
 from torchfair.fields import FaceFrames, matchings
 from torchfair.fields.frames import Floats
-from torchfair.meshing import MeshingSettings, ladder
-from torchfair.meshing.attempt import FailedAttemptError, Plan
+from torchfair.meshing import MeshingSettings, prepared
 from torchfair.meshing.components import read_surface
 from torchfair.meshing.cut_graph import CutGraph, cut_open
-from torchfair.meshing.ladder import Again, NoMeshError, mesh_component
+from torchfair.meshing.failed_attempt import FailedAttemptError
+from torchfair.meshing.ladder import Again, mesh_component
 from torchfair.meshing.lattice import SQUARES, Lattice, triangle_lattice
+from torchfair.meshing.no_mesh import NoMeshError
+from torchfair.meshing.plan import Plan
 from torchfair.meshing.plans import plans
 from torchfair.meshing.relaxation import loosened, stretched
 from torchfair.meshing.separation import gaps, separate_vectors
@@ -123,7 +125,7 @@ def test_where_there_is_no_boundary_nothing_is_tried_with_and_without_aligning_t
         tried.append(given[4].align)
         raise FailedAttemptError("no")
 
-    monkeypatch.setattr(ladder, "attempt", fails)
+    monkeypatch.setattr(prepared, "attempt", fails)
     with pytest.raises(NoMeshError):
         mesh_component(*given, MeshingSettings())
     assert set(tried) == {False}
@@ -138,7 +140,7 @@ def test_with_another_spacing_only_plans_of_the_same_size_are_tried(monkeypatch:
         tried.append(given[4])
         raise FailedAttemptError("no", hopeless=len(tried) == 1)
 
-    monkeypatch.setattr(ladder, "attempt", fails)
+    monkeypatch.setattr(prepared, "attempt", fails)
     surface = read_surface(*irregular(PrincipalParaboloid(), 600), MeshingSettings())
     given = surface.parts[0], surface.fields[0], SQUARES, 0.5, 0.25, MeshingSettings()
     with pytest.raises(NoMeshError, match="5 setting"):
@@ -164,7 +166,7 @@ def test_fields_that_cannot_be_made_even_are_tried_once(monkeypatch: pytest.Monk
         tried.append(even)
         raise MeshError("no")
 
-    monkeypatch.setattr(ladder, "combed", fails)
+    monkeypatch.setattr(prepared, "combed", fails)
     surface = read_surface(*irregular(PrincipalParaboloid(), 600), MeshingSettings())
     with pytest.raises(NoMeshError):
         mesh_component(surface.parts[0], surface.fields[0], triangle_lattice(0.9), 0.5, 0.25, MeshingSettings())

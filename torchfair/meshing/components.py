@@ -18,12 +18,12 @@ from ..fields.frames import Floats
 from ..geometry import FittedCurvature, ReferenceSurface
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
-from .attempt import PieceMesh
 from .curvature_sizes import CurvatureSizes
 from .curved_surface import on_curved_surface
 from .ladder import Again, mesh_component
 from .lattice import Lattice
 from .mesh_creases import MeshCreases
+from .piece_mesh import PieceMesh
 from .sizes import SizeField
 from .surface import DesignSurface, components_of
 from .surface_curvature import smooth_absolute_curvature

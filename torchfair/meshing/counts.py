@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 
 from ..settings.meshing_settings import MeshingSettings
 from .components import Pieces, ReadSurface, mesh_components
-from .ladder import Again, NoMeshError
+from .ladder import Again
 from .lattice import Lattice
+from .no_mesh import NoMeshError
 
 _CORRECTIONS = 4
 _SHARE = 1 / 6  # of the time limit, for a correction; all of them may take twice as long

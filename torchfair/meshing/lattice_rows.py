@@ -17,8 +17,8 @@ from .alignment import aligned
 from .components import Pieces, ReadSurface, on_surface
 from .counts import mesh_to_count
 from .curvature_sizes import CurvatureSizes, curvature_sizes
-from .ladder import NoMeshError
 from .lattice import triangle_lattice
+from .no_mesh import NoMeshError
 from .plans import SCALES, scaled_words
 from .row_distances import row_sizes, rows_across
 from .three_valent import with_three_valent_inside

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from ..settings.meshing_settings import MeshingSettings
-from .attempt import Plan
+from .plan import Plan
 
 _SMOOTHER = (1.0, 4.0, 16.0, 64.0)  # times the smoothing length
 _ROWS = ((1.0, 0.0), (1.0, 0.3), (1.0, 10.0), (4.0, 0.0), (1.0, 0.3), (1.0, 10.0), (4.0, 3.0), (16.0, 0.0), (64.0, 0.0))
