@@ -75,3 +75,22 @@ def test_elements_that_are_not_felt_change_nothing(monkeypatch: pytest.MonkeyPat
         least = float((long.square().sum() / (vertices.square().mean() * slopes.square().sum())).sqrt())
         assert vanishing(system, state, least * (1 + 1e-9)).tolist() == [True]
         assert vanishing(system, state, least * (1 - 1e-9)).tolist() == [False]
+
+
+def test_every_member_of_a_batch_is_looked_at_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With portions that end within members."""
+    monkeypatch.setattr(portions, "_PORTION", 5)
+    vertices, topology = wavy_grid(7, 6, triangles=True)
+    edges = topology.edges
+    lengths = torch.linspace(0.5, 1.5, len(edges), dtype=DOUBLE)
+    problem = GuidedProjection(
+        {"vertices": vertices}, [ElementTerm("edges", stretch, [("vertices", edges)], data=(lengths,))]
+    )
+    members = [vertices, vertices * torch.tensor([5.0, 1.0, 1.0]), vertices * torch.tensor([1.0, 0.2, 3.0])]
+    state, batch = {"vertices": torch.cat(members)}, problem.batched(len(members)).structure
+    with torch.no_grad():
+        system = batch.linearise(state)
+        for number, member in enumerate(members):
+            least = least_tolerance(member, edges, lengths)
+            assert bool(vanishing(system, state, least * (1 + 1e-9))[number])
+            assert not bool(vanishing(system, state, least * (1 - 1e-9))[number])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -142,12 +142,16 @@ class LinearSystem:
         return (change * (self.residuals[number] + 0.5 * change)).sum(0)
 
     def _change(self, number: int, step: Tensor) -> Tensor:
-        compiled, jacobian = self.structure.compiled[number], self.jacobians[number]
-        chosen, parts = self.felt[number], []
-        for elements in portions(jacobian.shape[2], jacobian):
-            unknowns = compiled.unknowns_of(elements if chosen is None else chosen[elements])
-            parts.append(torch.einsum("mkn,kn->mn", jacobian[..., elements], step[unknowns]))
+        jacobian = self.jacobians[number]
+        ranges = self.felt_unknowns(number)
+        parts = [torch.einsum("mkn,kn->mn", jacobian[..., some], step[unknowns]) for some, unknowns in ranges]
         return self._of_all(number, parts[0] if len(parts) == 1 else torch.cat(parts, 1))
+
+    def felt_unknowns(self, number: int) -> Iterator[tuple[slice, Tensor]]:
+        """Ranges of the elements of a term that are felt, and the flat numbers (K, n) of the unknowns of each range."""
+        chosen, jacobian = self.felt[number], self.jacobians[number]
+        for some in portions(jacobian.shape[2], jacobian):
+            yield some, self.structure.compiled[number].unknowns_of(some if chosen is None else chosen[some])
 
     def predicted_fall(self, step: Tensor) -> Tensor:
         """(members,) by how much the merit of the linearised residuals falls with a step (N,)."""

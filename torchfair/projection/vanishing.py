@@ -5,10 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from .compiled import CompiledTerm
 from .layout import State
 from .linear_system import LinearSystem
-from .portions import portions
 
 
 def vanishing(system: LinearSystem, state: State, tolerance: float) -> Tensor:
@@ -29,32 +27,22 @@ def vanishing(system: LinearSystem, state: State, tolerance: float) -> Tensor:
     unknowns = [sizes[name].repeat_interleave(n * d // count) for name, (n, d) in layout.sizes.items()]
     squares = torch.cat(unknowns).nan_to_num(nan=0.0)
     answer = torch.ones(count, dtype=torch.bool, device=structure.device)
-    parts = zip(structure.compiled, system.of_felt(system.residuals), system.jacobians, system.roots, strict=True)
-    for number, (compiled, residuals, jacobians, root) in enumerate(parts):
+    terms = zip(system.of_felt(system.residuals), system.jacobians, system.roots, strict=True)
+    for number, (residuals, jacobians, root) in enumerate(terms):
         if not residuals.shape[1]:
             continue  # none of its elements is felt: their residuals are zero
-        elements = system.elements(number)
-        inverse = torch.where(root > 0.0, 1.0 / root, 0.0)[elements] if root.ndim == 1 else None
-        if inverse is not None:
-            residuals = residuals * inverse
-        changes = _changes(compiled, jacobians, inverse, squares, elements)
+        inverse = residuals.new_ones(1).expand(residuals.shape[1])
+        if root.ndim == 1:
+            inverse = torch.where(root > 0.0, 1.0 / root, 0.0)[system.elements(number)]
+        residuals = residuals * inverse
+        ranges = system.felt_unknowns(number)
+        parts = [((jacobians[..., some] * inverse[some]).square() * squares[at]).sum(1) for some, at in ranges]
+        changes = torch.cat(parts, 1)
         answer &= _are_small(residuals.reshape(-1, count, residuals.shape[1] // count), changes, tolerance)
     if structure.affine is not None and system.affine_residual is not None:
         for residuals, changes in structure.affine.by_term(system.affine_residual, squares):
             answer &= _are_small(residuals.view(1, count, -1), changes, tolerance)
     return answer
-
-
-def _changes(
-    compiled: CompiledTerm, jacobians: Tensor, inverse: Tensor | None, squares: Tensor, elements: slice | Tensor
-) -> Tensor:
-    """(m, n) squares of what changes of all unknowns make of residuals, from Jacobians (m, K, n), a portion at once."""
-    parts = []
-    for part in portions(jacobians.shape[-1], jacobians):
-        some = jacobians[..., part] if inverse is None else jacobians[..., part] * inverse[part]
-        unknowns = compiled.unknowns_of(elements[part] if isinstance(elements, Tensor) else part)
-        parts.append((some.square() * squares[unknowns]).sum(1))
-    return torch.cat(parts, -1)
 
 
 def _are_small(residuals: Tensor, changes: Tensor, tolerance: float) -> Tensor:
