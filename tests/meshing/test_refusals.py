@@ -11,6 +11,8 @@ import torch
 from torchfair import MeshError, ShapeError, Topology, repair_mesh
 from torchfair.geometry import edge_lengths
 from torchfair.meshing import MeshingSettings, NoMeshError, principal_quads, principal_triangles, surface
+from torchfair.meshing.failed_attempt import FailedAttemptError
+from torchfair.meshing.no_mesh import no_mesh
 from torchfair.meshing.surface import components_of
 from torchfair.meshing.welded import check_welded
 from torchfair.shapes import Torus, irregular_triangles
@@ -47,6 +49,25 @@ def test_a_hole_too_small_is_named_and_as_many_faces_as_are_said_go_around_it(sc
     assert len(made.principal.topology.boundary_loops()) == 2
     made = principal_triangles(scale * points, topology, spacing=length / 3)
     assert len(made.principal.topology.boundary_loops()) == 2
+
+
+def test_the_first_attempt_that_knows_where_it_failed_is_told() -> None:
+    made = irregular_triangles(Torus(), 400)
+    (part,) = components_of(made.vertices, made.topology)
+    place = part.placed.vertices[7].numpy()
+    failures = [
+        FailedAttemptError("crosses are odd"),
+        FailedAttemptError("triangles are turned over", 31, place),
+        FailedAttemptError("no room", 12, part.placed.vertices[3].numpy()),
+        FailedAttemptError("too thin"),
+    ]
+    error = no_mesh(failures, part, 0.5)
+    assert error.vertex == 31
+    where = ", ".join(f"{x:.4g}" for x in part.vertices[7].tolist())
+    assert f"near vertex 31 at ({where}): triangles are turned over (4 setting(s) tried)" in str(error)
+    error = no_mesh(failures[::3], part, 0.5)
+    assert error.vertex == -1
+    assert str(error).startswith("no valid mesh was found: too thin (2 setting(s) tried)")
 
 
 def test_triangles_that_share_no_vertices_are_refused_and_meshed_once_they_are_welded() -> None:

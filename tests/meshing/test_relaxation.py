@@ -12,7 +12,7 @@ from meshing_tools import Flat, cut, ellipsoid, irregular, problem_of
 from torchfair import MeshError
 from torchfair.fields import FaceFrames, matchings
 from torchfair.fields.frames import Floats
-from torchfair.meshing import MeshingSettings, prepared
+from torchfair.meshing import MeshingSettings, prepared, sound_map
 from torchfair.meshing.components import read_surface
 from torchfair.meshing.cut_graph import CutGraph, cut_open
 from torchfair.meshing.failed_attempt import FailedAttemptError
@@ -22,6 +22,7 @@ from torchfair.meshing.no_mesh import NoMeshError
 from torchfair.meshing.plan import Plan
 from torchfair.meshing.plans import plans
 from torchfair.meshing.relaxation import loosened, stretched
+from torchfair.meshing.seamless_map import MapProblem, SeamlessMap
 from torchfair.meshing.separation import gaps, separate_vectors
 from torchfair.shapes import PrincipalParaboloid, Torus
 
@@ -104,6 +105,36 @@ def test_a_search_can_begin_with_a_later_plan() -> None:
     assert (words, plan) == ("", 0)
     _, words, plan = mesh_component(*given, Again(1, 0.3))
     assert (words, plan) == ("boundary not aligned", 1)
+
+
+@pytest.mark.parametrize("sound_at", [1, 2, 3])
+def test_a_map_that_is_turned_over_is_made_anew_once_where_weights_can_be_looser(
+    sound_at: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first map that is sound is taken; a second one is made only of a looser problem, and no third."""
+    untangle, weights = sound_map._untangled, list[Floats]()
+
+    def turned_over(problem: MapProblem) -> SeamlessMap:
+        weights.append(problem.anisotropy)
+        found = untangle(problem)
+        return found if len(weights) >= sound_at else replace(found, areas=np.r_[-1.0, found.areas[1:]])
+
+    def looser(problem: MapProblem, wanted: Floats) -> MapProblem:
+        assert (wanted == wanted.flat[0]).all()  # not those that the field allows
+        return replace(problem, anisotropy=problem.anisotropy / 5)
+
+    monkeypatch.setattr(sound_map, "_untangled", turned_over)
+    monkeypatch.setattr(sound_map, "loosened", looser)
+    surface = read_surface(*irregular(PrincipalParaboloid(), 600), MeshingSettings())
+    given = surface.parts[0], surface.fields[0], SQUARES, 0.3, 0.1, MeshingSettings(fallback=False)
+    if sound_at > 2:
+        with pytest.raises(NoMeshError, match="near vertex"):
+            mesh_component(*given)
+    else:
+        mesh, words, _ = mesh_component(*given)
+        assert len(mesh.faces) > 10
+        assert words == ""
+    assert [tuple(np.unique(each)) for each in weights] == [(30.0,), (6.0,)][:sound_at]
 
 
 @pytest.mark.parametrize("lattice", [SQUARES, triangle_lattice(1.0)])
