@@ -23,6 +23,8 @@ WANTED = np.array([1.0, 0.0, 0.0, 1.0])
 
 _TRIED = 16  # whole vectors, until no triangle is turned over
 _NEAR = 2.5  # spacings: singular vertices within that are kept apart
+_MOST_DENSE = 250  # whole numbers; with more the optimum of real ones is solved for without dense matrices
+_SHIFT = 1e-13  # of the largest diagonal entry: some numbers may change nothing
 _THIN = 0.05  # of the area wanted, below which triangles are counted as nearly turned over
 
 
@@ -128,8 +130,11 @@ class MapProblem:
     @cached_property
     def real_jacobians(self) -> Floats:
         """(4, F) of the optimum whose whole numbers may be any numbers, rows as in :meth:`jacobians`."""
-        optimum = self._optimum
-        parts = optimum.base + optimum.moves @ optimum.target
+        if self.split.basis.shape[1] > _MOST_DENSE:
+            parts = self._real_optimum()
+        else:
+            optimum = self._optimum
+            parts = optimum.base + optimum.moves @ optimum.target
         return np.asarray(self.jacobians(np.arange(len(self.density))) @ parts).reshape(4, -1)
 
     @cached_property
@@ -153,6 +158,19 @@ class MapProblem:
         target = np.linalg.lstsq(shifted, whole.T @ right - mixed.T @ best, rcond=None)[0]
         moves = np.asarray(self.split.whole @ self.split.basis - self.split.free @ answers)
         return _Optimum(base, moves, metric / scale, target)
+
+    def _real_optimum(self) -> Floats:
+        """(2N,) real and imaginary parts where whole numbers may be any: sparse, while the other is dense in them."""
+        rows, right = self._rows()
+        moves = sp.hstack([self.split.free, self.split.whole @ sp.csr_matrix(self.split.basis.astype(float))]).tocsr()
+        slope = (rows @ moves).tocsc()
+        normal = (slope.T @ slope).tocsr()
+        shifted = normal + sp.identity(normal.shape[0]) * _SHIFT * normal.diagonal().max()
+        solver = RslabDirect() if RslabDirect.available() else ScipyDirect()  # another pattern than that of the maps
+        factor = factorise(shifted.tocsr(), solver=solver)
+        return np.asarray(
+            moves @ _solve(factor, slope.T @ (right - rows @ self.split.fixed)) + self.split.fixed, np.float64
+        )
 
     def map_of(self, parts: Floats) -> SeamlessMap:
         """The map whose copies have real and imaginary parts (2N,) in turn."""

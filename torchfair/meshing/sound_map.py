@@ -19,6 +19,9 @@ from .untangling import is_hopeless, untangled
 _ANISOTROPY = 30.0  # of the map: 1 triples the angles to directions, 300 wins little and stretches edges
 _UNTANGLED = 2  # maps, the best first
 _NEARLY = 16  # triangles turned over and branches that are left: with more no second map is tried
+_ROOM = 2.0  # singular points and corners of creases over the cells asked for: each lies on a point of its own
+_FEW = 50  # of them are tried however few cells there are
+_MOST_WHOLE = 1000  # whole numbers: the nearest ones are searched for with dense matrices of that size
 
 
 def sound_map(
@@ -40,17 +43,21 @@ def sound_map(
         runs: of the boundary and of creases, that become lines.
 
     Raises:
-        FailedAttemptError: if triangles stay turned over, with the place.
+        FailedAttemptError: if triangles stay turned over, with the place; or at once, where more singular points and
+            corners of creases are to be kept than a mesh of that spacing has vertices, or a search ends in time for.
     """
     frames = surface.frames
     count = len(frames.triangles)
+    split = split_integers(frames, graph, seams, runs)
+    density = 1 / (spacings * lattice.spacings)
+    _check_room(int(graph.nodes.sum()), float(frames.areas @ density.prod(1)), split.basis.shape[1])
     problem = MapProblem(
         frames=frames,
         graph=graph,
         seams=seams,
-        split=split_integers(frames, graph, seams, runs),
+        split=split,
         shear=lattice.matrix,
-        density=1 / (spacings * lattice.spacings),
+        density=density,
         anisotropy=np.full(count, _ANISOTROPY),
     )
     wanted, problem = problem.density, stretched(problem)
@@ -61,6 +68,16 @@ def sound_map(
         return best
     vertices = best.branches if len(best.branches) else frames.triangles[best.flips[0]]
     raise _failure(surface, int(vertices[0]), is_hopeless(best))
+
+
+def _check_room(nodes: int, cells: float, whole: int) -> None:
+    """Raises a hopeless :class:`FailedAttemptError` where nodes do not find room in cells, or are too many to round."""
+    found = f"the surface has {nodes} singular points and corners of creases"
+    if nodes > _ROOM * max(cells, 1.0) + _FEW:
+        raise FailedAttemptError(f"{found}, too many for {cells:.0f} cells", hopeless=True)
+    if whole > _MOST_WHOLE:
+        words = f"{found}, {whole} whole numbers together, more than {_MOST_WHOLE}"
+        raise FailedAttemptError(words, hopeless=True)
 
 
 def _untangled(problem: MapProblem) -> SeamlessMap:
