@@ -7,7 +7,6 @@ import pytest
 from meshing_tools import cut, ellipsoid, problem_of, punched
 
 from torchfair.meshing import MeshingSettings, NoMeshError, principal_quads, seamless_map, sound_map
-from torchfair.meshing.failed_attempt import FailedAttemptError
 from torchfair.meshing.relaxation import stretched
 from torchfair.meshing.seamless_map import MapProblem
 from torchfair.shapes import icosphere
@@ -30,18 +29,24 @@ def test_a_map_is_not_begun_where_nodes_find_no_room(monkeypatch: pytest.MonkeyP
         monkeypatch.setattr(sound_map, "_ROOM", room)
         monkeypatch.setattr(sound_map, "_FEW", few)
         monkeypatch.setattr(sound_map, "_MOST_WHOLE", whole)
-        with pytest.raises(NoMeshError, match=words):
+        with pytest.raises(NoMeshError, match=words) as caught:
             principal_quads(*ellipsoid(3), count=150, settings=settings)
+        assert caught.value.vertex >= 0
     assert not begun
 
 
 def test_room_ends_where_nodes_are_too_many_and_whole_numbers_where_a_search_would_not_end() -> None:
-    sound_map._check_room(sound_map._FEW, 0.5, 100)
-    sound_map._check_room(850, 400.0, sound_map._MOST_WHOLE)
-    for nodes, whole in ((851, 100), (850, sound_map._MOST_WHOLE + 1)):
-        with pytest.raises(FailedAttemptError) as caught:
-            sound_map._check_room(nodes, 400.0, whole)
-        assert caught.value.hopeless  # nothing near it is tried
+    assert not sound_map._too_many(sound_map._FEW, 0.0, 100)
+    assert not sound_map._too_many(850, 400.0, sound_map._MOST_WHOLE)
+    assert "851 singular points and corners of creases, too many for 400 cells" in sound_map._too_many(851, 400.0, 9)
+    assert "1001 whole numbers together" in sound_map._too_many(850, 400.0, 1001)
+
+
+def test_the_place_that_is_told_is_a_node_with_another_nearest_to_it() -> None:
+    points = np.array([[0.0, 0, 0], [5, 0, 0], [5.1, 0, 0], [9, 0, 0], [9.3, 0, 0]])
+    assert sound_map._densest(points, np.array([0, 1, 3, 4])) in (3, 4)  # not vertex 2, which is none
+    assert sound_map._densest(points, np.array([3])) == 3
+    assert sound_map._densest(points, np.zeros(0, np.int64)) == 0
 
 
 @pytest.mark.parametrize("name", ["ellipsoid", "sphere with holes"])

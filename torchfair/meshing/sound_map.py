@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import KDTree
 
-from ..fields.frames import Floats
+from ..fields.frames import Floats, Ints
 from .boundary_runs import BoundaryRun
 from .cut_graph import CutGraph
 from .failed_attempt import FailedAttemptError
@@ -44,13 +45,16 @@ def sound_map(
 
     Raises:
         FailedAttemptError: if triangles stay turned over, with the place; or at once, where more singular points and
-            corners of creases are to be kept than a mesh of that spacing has vertices, or a search ends in time for.
+            corners of creases are to be kept than such a mesh has room for, or a search would not end.
     """
     frames = surface.frames
     count = len(frames.triangles)
     split = split_integers(frames, graph, seams, runs)
     density = 1 / (spacings * lattice.spacings)
-    _check_room(int(graph.nodes.sum()), float(frames.areas @ density.prod(1)), split.basis.shape[1])
+    nodes = np.flatnonzero(graph.nodes)
+    crowd = _too_many(len(nodes), float(frames.areas @ density.prod(1)), split.basis.shape[1])
+    if crowd:
+        raise _failure(surface, _densest(frames.points, nodes), crowd, hopeless=True)
     problem = MapProblem(
         frames=frames,
         graph=graph,
@@ -67,17 +71,25 @@ def sound_map(
     if best.is_sound:
         return best
     vertices = best.branches if len(best.branches) else frames.triangles[best.flips[0]]
-    raise _failure(surface, int(vertices[0]), is_hopeless(best))
+    raise _failure(surface, int(vertices[0]), "triangles are turned over", hopeless=is_hopeless(best))
 
 
-def _check_room(nodes: int, cells: float, whole: int) -> None:
-    """Raises a hopeless :class:`FailedAttemptError` where nodes do not find room in cells, or are too many to round."""
+def _too_many(nodes: int, cells: float, whole: int) -> str:
+    """In words that nodes do not find room in cells, or are too many to be rounded together; empty where they do."""
     found = f"the surface has {nodes} singular points and corners of creases"
-    if nodes > _ROOM * max(cells, 1.0) + _FEW:
-        raise FailedAttemptError(f"{found}, too many for {cells:.0f} cells", hopeless=True)
+    if nodes > _ROOM * cells + _FEW:
+        return f"{found}, too many for {cells:.0f} cells"
     if whole > _MOST_WHOLE:
-        words = f"{found}, {whole} whole numbers together, more than {_MOST_WHOLE}"
-        raise FailedAttemptError(words, hopeless=True)
+        return f"{found}, {whole} whole numbers together, more than {_MOST_WHOLE}"
+    return ""
+
+
+def _densest(points: Floats, nodes: Ints) -> int:
+    """The node that is nearest to another; any vertex where there is none."""
+    if len(nodes) < 2:
+        return int(nodes[0]) if len(nodes) else 0
+    gaps = np.asarray(KDTree(points[nodes]).query(points[nodes], 2)[0])
+    return int(nodes[np.argmin(gaps[:, 1])])
 
 
 def _untangled(problem: MapProblem) -> SeamlessMap:
@@ -95,8 +107,8 @@ def _untangled(problem: MapProblem) -> SeamlessMap:
     return found
 
 
-def _failure(surface: DesignSurface, vertex: int, hopeless: bool) -> FailedAttemptError:
+def _failure(surface: DesignSurface, vertex: int, words: str, *, hopeless: bool) -> FailedAttemptError:
     place = surface.frames.points[vertex]
     known = np.flatnonzero(surface.numbers.numpy() >= 0)
     nearest = known[np.argmin(((surface.frames.points[known] - place) ** 2).sum(1))]
-    return FailedAttemptError("triangles are turned over", int(surface.numbers[nearest]), place, hopeless=hopeless)
+    return FailedAttemptError(words, int(surface.numbers[nearest]), place, hopeless=hopeless)
