@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,6 +30,11 @@ class IntegerSplit:
     whole: sp.csr_matrix
     basis: Ints
     fixed: np.ndarray
+
+    @cached_property
+    def real(self) -> sp.csr_matrix:
+        """(2N, n + k) of x and y as real values, one after the other."""
+        return sp.hstack([self.free, self.whole @ sp.csr_matrix(self.basis.astype(float))]).tocsr()
 
 
 def split_integers(frames: FaceFrames, graph: CutGraph, seams: Seams, runs: list[BoundaryRun]) -> IntegerSplit:

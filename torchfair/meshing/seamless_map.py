@@ -88,6 +88,10 @@ class _Optimum(NamedTuple):
     target: Floats
 
 
+def _direct() -> LinearSolver:
+    return RslabDirect() if RslabDirect.available() else ScipyDirect()
+
+
 @dataclass(frozen=True, eq=False)
 class MapProblem:
     """Least squares for the gradients of a seamless map, factorised once.
@@ -97,7 +101,8 @@ class MapProblem:
         shear: (2, 2) from whole coordinates to those whose gradients follow the field.
         density: (F, 2) gradients wanted along and across the field, one over lengths.
         anisotropy: (F,) weight of the wrong direction of gradients over that of their lengths.
-        solver: keeps its analysis from one problem to the next that differs in density and weights only.
+        solver, real_solver: for free values, and for all where whole numbers may be any; they keep their analysis from
+            one problem to the next that differs in density and weights only.
     """
 
     frames: FaceFrames
@@ -107,7 +112,8 @@ class MapProblem:
     shear: Floats
     density: Floats
     anisotropy: Floats
-    solver: LinearSolver = field(default_factory=lambda: RslabDirect() if RslabDirect.available() else ScipyDirect())
+    solver: LinearSolver = field(default_factory=_direct)
+    real_solver: LinearSolver = field(default_factory=_direct)
 
     def candidates(self) -> list[SeamlessMap]:
         """Maps with whole numbers near the real optimum, the best first: less turned over, then nearer.
@@ -161,16 +167,13 @@ class MapProblem:
 
     def _real_optimum(self) -> Floats:
         """(2N,) real and imaginary parts where whole numbers may be any: sparse, while the other is dense in them."""
-        rows, right = self._rows()
-        moves = sp.hstack([self.split.free, self.split.whole @ sp.csr_matrix(self.split.basis.astype(float))]).tocsr()
+        (rows, right), moves = self._rows(), self.split.real
         slope = (rows @ moves).tocsc()
         normal = (slope.T @ slope).tocsr()
         shifted = normal + sp.identity(normal.shape[0]) * _SHIFT * normal.diagonal().max()
-        solver = RslabDirect() if RslabDirect.available() else ScipyDirect()  # another pattern than that of the maps
-        factor = factorise(shifted.tocsr(), solver=solver)
-        return np.asarray(
-            moves @ _solve(factor, slope.T @ (right - rows @ self.split.fixed)) + self.split.fixed, np.float64
-        )
+        factor = factorise(shifted.tocsr(), solver=self.real_solver)
+        best = _solve(factor, slope.T @ (right - rows @ self.split.fixed))
+        return np.asarray(moves @ best + self.split.fixed, np.float64)
 
     def map_of(self, parts: Floats) -> SeamlessMap:
         """The map whose copies have real and imaginary parts (2N,) in turn."""

@@ -64,9 +64,9 @@ def sound_map(
         density=density,
         anisotropy=np.full(count, _ANISOTROPY),
     )
-    wanted, problem = problem.density, stretched(problem)
+    problem = stretched(problem)
     best = _untangled(problem)
-    if not best.is_sound and not is_hopeless(best) and (looser := loosened(problem, wanted)) is not problem:
+    if not best.is_sound and not is_hopeless(best) and (looser := loosened(problem, density)) is not problem:
         best = _untangled(looser)
     if best.is_sound:
         return best
