@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshing_tools import cut, ellipsoid, problem_of, punched
+from meshing_tools import cut, ellipsoid, irregular, problem_of, punched
 
 from torchfair.meshing import MeshingSettings, NoMeshError, principal_quads, seamless_map, sound_map
 from torchfair.meshing.relaxation import stretched
 from torchfair.meshing.seamless_map import MapProblem
-from torchfair.shapes import icosphere
+from torchfair.shapes import Torus, icosphere
 
 
 def test_a_map_is_not_begun_where_nodes_find_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -35,6 +35,14 @@ def test_a_map_is_not_begun_where_nodes_find_no_room(monkeypatch: pytest.MonkeyP
     assert not begun
 
 
+def test_where_nodes_find_no_room_spacings_a_little_different_are_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four lengths of smoothing are, with one spacing each, of twenty plans."""
+    monkeypatch.setattr(sound_map, "_ROOM", 0.0)
+    monkeypatch.setattr(sound_map, "_FEW", 0)
+    with pytest.raises(NoMeshError, match=r"too many for 150 cells \(4 setting\(s\) tried\)"):
+        principal_quads(*ellipsoid(3), count=150)
+
+
 def test_room_ends_where_nodes_are_too_many_and_whole_numbers_where_a_search_would_not_end() -> None:
     assert not sound_map._too_many(sound_map._FEW, 0.0, 100)
     assert not sound_map._too_many(850, 400.0, sound_map._MOST_WHOLE)
@@ -49,15 +57,22 @@ def test_the_place_that_is_told_is_a_node_with_another_nearest_to_it() -> None:
     assert sound_map._densest(points, np.zeros(0, np.int64)) == 0
 
 
-@pytest.mark.parametrize("name", ["ellipsoid", "sphere with holes"])
+ROUND = icosphere(3)
+SHAPES = {
+    "ellipsoid": ellipsoid(3),
+    "sphere with holes": punched(ROUND.vertices, ROUND.topology, 0, 20, 40),
+    "torus": irregular(Torus()),  # without nodes, so that one vertex is held
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
 def test_the_optimum_of_real_numbers_is_the_same_without_dense_matrices(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    round_one = icosphere(3)
-    surface = ellipsoid(3) if name == "ellipsoid" else punched(round_one.vertices, round_one.topology, 0, 20, 40)
-    frames, graph = cut(*surface)
+    frames, graph = cut(*SHAPES[name])
     problem = problem_of(frames, graph, 0.2)[0]
     assert problem.split.basis.shape[1] > 0
+    assert problem.split.fixed.any() == (name == "torus")
     dense = problem.real_jacobians
     monkeypatch.setattr(seamless_map, "_MOST_DENSE", 0)
     monkeypatch.delattr(seamless_map.MapProblem, "_optimum")
