@@ -47,14 +47,27 @@ def test_room_ends_where_nodes_are_too_many_and_whole_numbers_where_a_search_wou
     assert not sound_map._too_many(sound_map._FEW, 0.0, 100)
     assert not sound_map._too_many(850, 400.0, sound_map._MOST_WHOLE)
     assert "851 singular points and corners of creases, too many for 400 cells" in sound_map._too_many(851, 400.0, 9)
-    assert "1001 whole numbers together" in sound_map._too_many(850, 400.0, 1001)
+    assert "2001 whole numbers are to be found" in sound_map._too_many(850, 400.0, 2001)
 
 
 def test_the_place_that_is_told_is_a_node_with_another_nearest_to_it() -> None:
     points = np.array([[0.0, 0, 0], [5, 0, 0], [5.1, 0, 0], [9, 0, 0], [9.3, 0, 0]])
     assert sound_map._densest(points, np.array([0, 1, 3, 4])) in (3, 4)  # not vertex 2, which is none
     assert sound_map._densest(points, np.array([3])) == 3
-    assert sound_map._densest(points, np.zeros(0, np.int64)) == 0
+
+
+def test_no_place_is_told_where_only_holes_and_handles_have_too_many_whole_numbers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sound_map, "_MOST_WHOLE", 3)
+    with pytest.raises(NoMeshError, match="found: 4 whole numbers are to be found") as caught:
+        principal_quads(*irregular(Torus()), count=100)
+    assert caught.value.vertex == -1
+
+
+def test_a_plate_of_many_holes_is_within_bounds() -> None:
+    """One of 324 holes asked for 1757 whole numbers, and was meshed with 16 000 quads."""
+    assert not sound_map._too_many(0, 16000.0, 1757)
 
 
 ROUND = icosphere(3)

@@ -22,7 +22,7 @@ _UNTANGLED = 2  # maps, the best first
 _NEARLY = 16  # triangles turned over and branches that are left: with more no second map is tried
 _ROOM = 2.0  # singular points and corners of creases over the cells asked for: each lies on a point of its own
 _FEW = 50  # of them are tried however few cells there are
-_MOST_WHOLE = 1000  # whole numbers: the nearest ones are searched for with dense matrices of that size
+_MOST_WHOLE = 2000  # whole numbers: the nearest ones are searched for with dense matrices of that size
 
 
 def sound_map(
@@ -54,6 +54,8 @@ def sound_map(
     nodes = np.flatnonzero(graph.nodes)
     crowd = _too_many(len(nodes), float(frames.areas @ density.prod(1)), split.basis.shape[1])
     if crowd:
+        if not len(nodes):
+            raise FailedAttemptError(crowd, hopeless=True)
         raise _failure(surface, _densest(frames.points, nodes), crowd, hopeless=True)
     problem = MapProblem(
         frames=frames,
@@ -76,18 +78,17 @@ def sound_map(
 
 def _too_many(nodes: int, cells: float, whole: int) -> str:
     """In words that nodes do not find room in cells, or are too many to be rounded together; empty where they do."""
-    found = f"the surface has {nodes} singular points and corners of creases"
     if nodes > _ROOM * cells + _FEW:
-        return f"{found}, too many for {cells:.0f} cells"
+        return f"the surface has {nodes} singular points and corners of creases, too many for {cells:.0f} cells"
     if whole > _MOST_WHOLE:
-        return f"{found}, {whole} whole numbers together, more than {_MOST_WHOLE}"
+        return f"{whole} whole numbers are to be found for singular points, creases and holes, more than {_MOST_WHOLE}"
     return ""
 
 
 def _densest(points: Floats, nodes: Ints) -> int:
-    """The node that is nearest to another; any vertex where there is none."""
-    if len(nodes) < 2:
-        return int(nodes[0]) if len(nodes) else 0
+    """The node that is nearest to another; one alone is that one."""
+    if len(nodes) == 1:
+        return int(nodes[0])
     gaps = np.asarray(KDTree(points[nodes]).query(points[nodes], 2)[0])
     return int(nodes[np.argmin(gaps[:, 1])])
 
