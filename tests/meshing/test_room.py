@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshing_tools import cut, ellipsoid, irregular, problem_of, punched
+from meshing_tools import ellipsoid, irregular
 
-from torchfair.meshing import MeshingSettings, NoMeshError, principal_quads, seamless_map, sound_map
+from torchfair.meshing import MeshingSettings, NoMeshError, principal_quads, sound_map
 from torchfair.meshing.relaxation import stretched
 from torchfair.meshing.seamless_map import MapProblem
-from torchfair.shapes import Torus, icosphere
+from torchfair.shapes import Torus
 
 
 def test_a_map_is_not_begun_where_nodes_find_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,26 +68,3 @@ def test_no_place_is_told_where_only_holes_and_handles_have_too_many_whole_numbe
 def test_a_plate_of_many_holes_is_within_bounds() -> None:
     """One of 324 holes asked for 1757 whole numbers, and was meshed with 16 000 quads."""
     assert not sound_map._too_many(0, 16000.0, 1757)
-
-
-ROUND = icosphere(3)
-SHAPES = {
-    "ellipsoid": ellipsoid(3),
-    "sphere with holes": punched(ROUND.vertices, ROUND.topology, 0, 20, 40),
-    "torus": irregular(Torus()),  # without nodes, so that one vertex is held
-}
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_the_optimum_of_real_numbers_is_the_same_without_dense_matrices(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    frames, graph = cut(*SHAPES[name])
-    problem = problem_of(frames, graph, 0.2)[0]
-    assert problem.split.basis.shape[1] > 0
-    assert problem.split.fixed.any() == (name == "torus")
-    dense = problem.real_jacobians
-    monkeypatch.setattr(seamless_map, "_MOST_DENSE", 0)
-    monkeypatch.delattr(seamless_map.MapProblem, "_optimum")
-    sparse = problem_of(frames, graph, 0.2)[0].real_jacobians
-    assert np.abs(sparse - dense).max() < 1e-5 * np.abs(dense).max()

@@ -13,6 +13,8 @@ Ints = npt.NDArray[np.int64]
 _MOST_REDUCED = 250  # unknowns; the basis of a larger lattice is taken as it is
 _MOST_SWAPS = 20_000
 _LOVASZ = 0.9
+_AT_ONCE = 64  # unknowns whose rounding is felt by the rest of a matrix in one product
+_LEAST = 1e-10  # of the trace of a norm: what every direction counts at least
 
 
 class WholeVectors(NamedTuple):
@@ -26,24 +28,25 @@ def closest_vectors(metric: Floats, target: Floats, beam: int = 256) -> WholeVec
     """Whole vectors ``y`` with small ``(y - target)^T metric (y - target)``.
 
     In a reduced basis unknowns are rounded one after the other, the most certain first, each followed by the best
-    answer of the others; of the branches the ``beam`` best are kept.
+    answer of the others; of the branches the ``beam`` best are kept. Every direction counts 1e-10 of the trace besides,
+    so that where the norm is zero whole numbers stay near the target.
 
     Args:
-        metric: (size, size) positive definite.
+        metric: (size, size) symmetric, positive semidefinite.
         target: (size,).
         beam: number of vectors.
     """
     size = len(target)
     if not size:
         return WholeVectors(np.zeros((1, 0), np.int64), np.zeros(1))
+    metric = metric + _LEAST * (float(np.trace(metric)) or 1.0) * np.eye(size)
     basis = reduced_basis(metric)
     inverse = np.rint(np.linalg.inv(basis.astype(float)))
     if (np.rint(basis @ inverse) != np.eye(size)).any():
         basis, inverse = np.eye(size, dtype=np.int64), np.eye(size)
     reduced = basis.T @ metric @ basis
-    reduced = (reduced + reduced.T) / 2 + np.eye(size) * 1e-12 * np.trace(reduced) / size
-    answers = np.linalg.inv(reduced)
-    order, columns = _certain_first((answers + answers.T) / 2, inverse @ target)
+    answers = np.linalg.inv((reduced + reduced.T) / 2)
+    order, columns = _certain_first((answers + answers.T) / 2, inverse @ target, float(1 / np.trace(reduced)))
     branches, costs = (inverse @ target)[None], np.zeros(1)
     for (unknown, stiffness), column in zip(order, columns, strict=True):
         here = branches[:, unknown]
@@ -60,24 +63,32 @@ def closest_vectors(metric: Floats, target: Floats, beam: int = 256) -> WholeVec
     return WholeVectors(np.rint(branches).astype(np.int64) @ basis.T, costs)
 
 
-def _certain_first(answers: Floats, target: Floats) -> tuple[list[tuple[int, float]], list[Floats]]:
-    """Order of rounding, the inverse stiffness of each unknown when its turn comes, and how the others answer."""
+def _certain_first(answers: Floats, target: Floats, least: float) -> tuple[list[tuple[int, float]], list[Floats]]:
+    """Order of rounding, the inverse stiffness of each unknown when its turn comes, and how the others answer.
+
+    No inverse stiffness is less than one over the largest eigenvalue; ``least`` is not more than that.
+    """
     size = len(target)
     free = np.ones(size, bool)
     order, columns = [], []
-    answers, values = answers.copy(), target.copy()
-    for _ in range(size):
+    answers, values, diagonal = answers.copy(), target.copy(), np.diag(answers).copy()
+    late = np.zeros((size, _AT_ONCE))  # answers less late @ late.T are those of the unknowns that are free
+    for number in range(size):
         moves = np.rint(values) - values
-        stiffness = np.maximum(np.diag(answers), 1e-300)
-        unknown = int(np.argmin(np.where(free, moves**2 / stiffness, np.inf)))
-        column = answers[:, unknown] / stiffness[unknown]
-        order.append((unknown, float(stiffness[unknown])))
-        columns.append(column.copy())
+        unknown = int(np.argmin(np.where(free, moves**2 / np.maximum(diagonal, least), np.inf)))
+        stiffness = max(float(diagonal[unknown]), least)
+        answer = np.where(free, answers[:, unknown] - late @ late[unknown], 0.0)
+        column = answer / stiffness
+        order.append((unknown, stiffness))
+        columns.append(column)
         values = values + column * moves[unknown]
         values[unknown] = np.rint(values[unknown])
         free[unknown] = False
-        answers = answers - np.outer(column, answers[unknown])
-        answers[unknown] = answers[:, unknown] = 0
+        diagonal -= answer * column
+        late[:, number % _AT_ONCE] = answer / stiffness**0.5
+        if (number + 1) % _AT_ONCE == 0:
+            answers -= late @ late.T
+            late[:] = 0
     return order, columns
 
 
@@ -88,7 +99,7 @@ def reduced_basis(metric: Floats) -> Ints:
     if size > _MOST_REDUCED:
         return basis
     values, vectors = np.linalg.eigh(metric)
-    root = (vectors * np.sqrt(np.maximum(values, values.max() * 1e-12))).T
+    root = (vectors * np.sqrt(np.maximum(values, _LEAST * values.max()))).T
     triangle = np.linalg.qr(root, mode="r")
     squares = np.diag(triangle) ** 2
     shares = (triangle / np.diag(triangle)[:, None]).T.copy()

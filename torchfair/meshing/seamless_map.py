@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-import torch
 
 from ..fields.frames import FaceFrames, Floats, Ints
 from ..fields.matchings import QUARTER
-from ..linear import Factor, LinearSolver, RslabDirect, ScipyDirect, factorise
+from ..linear import LinearSolver, RslabDirect, ScipyDirect
 from .cut_graph import CutGraph
 from .integers import IntegerSplit, real_form
 from .seams import ROTATIONS, Seams
 from .separation import gaps, separate_vectors
+from .whole_optimum import WholeOptimum, real_optimum, whole_optimum
 
 WANTED = np.array([1.0, 0.0, 0.0, 1.0])
 """Jacobian of a map as wanted: gradients of the first coordinate along and across the field, then of the second."""
 
 _TRIED = 16  # whole vectors, until no triangle is turned over
 _NEAR = 2.5  # spacings: singular vertices within that are kept apart
-_MOST_DENSE = 250  # whole numbers; with more the optimum of real ones is solved for without dense matrices
-_SHIFT = 1e-13  # of the largest diagonal entry: some numbers may change nothing
 _THIN = 0.05  # of the area wanted, below which triangles are counted as nearly turned over
 
 
@@ -73,21 +70,6 @@ class SeamlessMap:
         return np.where(self.graph.cut, np.rint(steps.real) + 1j * np.rint(steps.imag), 0)
 
 
-class _Optimum(NamedTuple):
-    """Values of copies as whole numbers y say, all others following: ``base + moves @ y``.
-
-    Attributes:
-        base: (2N,) where all whole numbers are zero.
-        moves: (2N, k) by each whole number.
-        metric, target: the least squares are ``(y - target)^T metric (y - target)``, (k, k) and (k,).
-    """
-
-    base: Floats
-    moves: Floats
-    metric: Floats
-    target: Floats
-
-
 def _direct() -> LinearSolver:
     return RslabDirect() if RslabDirect.available() else ScipyDirect()
 
@@ -122,13 +104,13 @@ class MapProblem:
         """
         optimum = self._optimum
         if not len(optimum.target):
-            return [self.map_of(optimum.base.copy())]
+            return [self.map_of(optimum.parts(optimum.target))]
         near = _NEAR * float(np.median(self.density.prod(1))) ** -0.5
         between = real_form(gaps(self.frames, self.graph, self.seams, near))
-        rows, offsets = between @ optimum.moves, between @ optimum.base
+        rows, offsets = optimum.seen_by(between)
         found = []
         for vector in separate_vectors(optimum.metric, optimum.target, rows, offsets)[:_TRIED]:
-            found.append(self.map_of(optimum.base + optimum.moves @ vector))
+            found.append(self.map_of(optimum.parts(vector)))
             if found[-1].is_sound:
                 return [found[-1]]
         return sorted(found, key=badness)
@@ -136,44 +118,12 @@ class MapProblem:
     @cached_property
     def real_jacobians(self) -> Floats:
         """(4, F) of the optimum whose whole numbers may be any numbers, rows as in :meth:`jacobians`."""
-        if self.split.basis.shape[1] > _MOST_DENSE:
-            parts = self._real_optimum()
-        else:
-            optimum = self._optimum
-            parts = optimum.base + optimum.moves @ optimum.target
+        parts = real_optimum(*self._rows(), self.split, self.real_solver)
         return np.asarray(self.jacobians(np.arange(len(self.density))) @ parts).reshape(4, -1)
 
     @cached_property
-    def _optimum(self) -> _Optimum:
-        rows, right = self._rows()
-        free = (rows @ self.split.free).tocsc()
-        whole = np.asarray((rows @ self.split.whole) @ self.split.basis)
-        right = right - rows @ self.split.fixed
-        factor = factorise((free.T @ free).tocsr(), solver=self.solver)
-        best = _solve(factor, free.T @ right)
-        base = self.split.free @ best + self.split.fixed
-        count = whole.shape[1]
-        if not count:
-            return _Optimum(base, np.zeros((len(base), 0)), np.zeros((0, 0)), np.zeros(0))
-        mixed = free.T @ whole
-        answers = _solve(factor, mixed)
-        metric = whole.T @ whole - mixed.T @ answers
-        metric = (metric + metric.T) / 2
-        scale = np.linalg.eigvalsh(metric)[-1]
-        shifted = metric + 1e-13 * scale * np.eye(count)
-        target = np.linalg.lstsq(shifted, whole.T @ right - mixed.T @ best, rcond=None)[0]
-        moves = np.asarray(self.split.whole @ self.split.basis - self.split.free @ answers)
-        return _Optimum(base, moves, metric / scale, target)
-
-    def _real_optimum(self) -> Floats:
-        """(2N,) real and imaginary parts where whole numbers may be any: sparse, while the other is dense in them."""
-        (rows, right), moves = self._rows(), self.split.real
-        slope = (rows @ moves).tocsc()
-        normal = (slope.T @ slope).tocsr()
-        shifted = normal + sp.identity(normal.shape[0]) * _SHIFT * normal.diagonal().max()
-        factor = factorise(shifted.tocsr(), solver=self.real_solver)
-        best = _solve(factor, slope.T @ (right - rows @ self.split.fixed))
-        return np.asarray(moves @ best + self.split.fixed, np.float64)
+    def _optimum(self) -> WholeOptimum:
+        return whole_optimum(*self._rows(), self.split, self.solver)
 
     def map_of(self, parts: Floats) -> SeamlessMap:
         """The map whose copies have real and imaginary parts (2N,) in turn."""
@@ -217,7 +167,3 @@ class MapProblem:
 def badness(found: SeamlessMap) -> tuple[int, float]:
     """How far a map is from one to one near every point: triangles turned over and branches, then thin ones."""
     return len(found.flips) + len(found.branches), float(np.maximum(_THIN - found.areas, 0).sum())
-
-
-def _solve(factor: Factor, right: Floats) -> Floats:
-    return np.asarray(factor.solve(torch.from_numpy(np.ascontiguousarray(right))).values.numpy())
