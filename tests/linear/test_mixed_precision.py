@@ -63,6 +63,15 @@ def test_double_precision_takes_over_for_bad_matrices(holding: float) -> None:
 
 
 @with_rslab
+def test_double_precision_from_the_first_on() -> None:
+    solver, matrix = RslabDirect(mixed=False), sp.diags([[-1.0] * 59, [3.0] * 60, [-1.0] * 59], [-1, 0, 1]).tocsr()
+    right = torch.rand(60, 40, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    solution = factorise(matrix, solver=solver).solve(right).values
+    assert not solver.single
+    assert float((torch.from_numpy(matrix.toarray()) @ solution - right).abs().max()) < 1e-14
+
+
+@with_rslab
 def test_a_singular_matrix_is_refused_in_both_precisions() -> None:
     problem = chain(1.0)
     system = problem.structure.linearise({"x": torch.zeros(LENGTH, 1, dtype=torch.float64)})

@@ -71,7 +71,7 @@ class SeamlessMap:
 
 
 def _direct() -> LinearSolver:
-    return RslabDirect() if RslabDirect.available() else ScipyDirect()
+    return RslabDirect(mixed=False) if RslabDirect.available() else ScipyDirect()
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,8 @@ class MapProblem:
         density: (F, 2) gradients wanted along and across the field, one over lengths.
         anisotropy: (F,) weight of the wrong direction of gradients over that of their lengths.
         solver, real_solver: for free values, and for all where whole numbers may be any; they keep their analysis from
-            one problem to the next that differs in density and weights only.
+            one problem to the next that differs in density and weights only. Both factor in double precision: one has
+            as many right-hand sides as there are whole numbers, the other is nearly singular.
     """
 
     frames: FaceFrames
