@@ -77,9 +77,8 @@ def test_every_option_changes_its_field_and_no_other(command: JobCommand) -> Non
         if field.is_switch:
             word, words = str(not field.default).lower(), [f"--{'no-' if field.default else ''}{option}"]
         else:
-            word = {"smoothing": "0.2", "coarse_smoothing": "0.9", "smallest_area": "0.4", "smallest_edge": "0.4"}.get(
-                name
-            ) or another(field)
+            shares = dict.fromkeys(("smallest_area", "smallest_share", "smallest_edge"), "0.4")
+            word = ({"smoothing": "0.2", "coarse_smoothing": "0.9"} | shares).get(name) or another(field)
             words = [f"--{option}", word]
         found = values(parse(command, *words))
         assert found.pop(name) == field.parse(word) != defaults[name], option

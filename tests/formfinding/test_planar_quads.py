@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from torchfair import Topology
+from torchfair.boundary import boundary_corners
 from torchfair.formfinding import (
     PLANAR_QUADS,
     FairSettings,
@@ -21,6 +22,8 @@ from torchfair.formfinding import (
     minimise_normal_variation,
     planar_quads,
 )
+from torchfair.formfinding.fair.kept_corners import held_corners
+from torchfair.geometry import face_areas
 from torchfair.meshing import QuadMesh, combing, measure_mesh_on, principal_quads
 from torchfair.projection import Callback, Status
 from torchfair.shapes import PrincipalParaboloid, builtin_mesh, icosphere, irregular_triangles
@@ -138,6 +141,7 @@ def test_where_panels_are_nearly_planar_directions_count_two_thirds_and_what_is_
     """Though not where it is not, whatever else is better."""
     surface, mesh = saddle
     warps = iter([3e-3, second])
+    monkeypatch.setattr(MODULE, "held_corners", lambda topology, corners: [])
 
     def measured(vertices: Tensor, of: QuadMesh) -> dict[str, Any]:
         return {**measure_mesh_on(vertices, of), "planarity_max": next(warps)}
@@ -190,11 +194,91 @@ def test_faces_beyond_the_distance_limit_are_told_with_what_a_mesh_can_be_asked_
     surface, mesh = saddle
     monkeypatch.setattr(MODULE, "PLANAR_QUADS", replace(PLANAR_QUADS, distance_limit=1e-5))
     made, job = planar_quads(mesh, surface)
-    (of_the_job,) = (note for note in job.notes if "beyond the distance limit" in note)
-    (note,) = (note for note in made.notes if "beyond the distance limit" in note)
-    assert of_the_job.endswith("limit: planar_distance 0 to keep that")
-    assert note.endswith("limit. Ask for more faces, which are more nearly planar before")
-    assert not any("planar_distance" in note for note in made.notes)
+    for notes in (made.notes, job.notes):
+        (note,) = (note for note in notes if "beyond the distance limit" in note)
+        assert note.endswith("limit. Ask for more faces, which are more nearly planar before")
+        assert not any("planar_distance" in note for note in notes)
+
+
+def test_what_is_not_kept_names_what_a_mesh_can_be_asked_for(saddle, monkeypatch):
+    """In promises and notes, which are the same; the settings of the solve are those of another command."""
+    surface, mesh = saddle
+    monkeypatch.setattr(MODULE, "PLANAR_QUADS", replace(PLANAR_QUADS, distance_limit=1e-5, planar_distance=0.0))
+    made, job = planar_quads(mesh, surface)
+    assert not job.holds
+    (missed,) = (str(promise) for promise in job.promises if not promise.holds)
+    assert missed.startswith("planarity of kept faces")
+    assert missed.endswith("ask for more faces, which are more nearly planar before, or make a rough surface smooth "
+        "first: torchfair denoise")  # fmt: skip
+    assert missed in job.notes
+    assert missed in made.notes
+    assert not any("fixed" in note for note in made.notes)
+
+
+def test_corners_of_the_boundary_stay(saddle):
+    surface, mesh = saddle
+    made, job = planar_quads(mesh, surface)
+    corners = boundary_corners(mesh.vertices, mesh.topology, PLANAR_QUADS.corner_angle)
+    assert int(corners.sum()) == 4
+    assert torch.equal(made.vertices[corners], mesh.vertices[corners])
+    assert float((made.vertices - mesh.vertices).norm(dim=1).max()) > 1e-3
+    assert job.holds
+    assert not any("corners" in note for note in made.notes)
+
+
+def test_corners_stay_in_single_precision_too(saddle):
+    (points, topology), _ = saddle
+    surface = points.float() + 20.0, topology
+    mesh = principal_quads(*surface, count=60)
+    made, _ = planar_quads(mesh, surface)
+    corners = boundary_corners(mesh.vertices, mesh.topology, PLANAR_QUADS.corner_angle)
+    assert int(corners.sum()) == 4
+    assert torch.equal(made.vertices[corners], mesh.vertices[corners])
+
+
+def test_corners_move_where_faces_are_planar_only_then(saddle, monkeypatch):
+    """As where nearly all vertices are said to be corners; how far is said."""
+    surface, mesh = saddle
+    most = torch.arange(len(mesh.vertices) - 3)
+    solve, kept = MODULE.minimise_normal_variation, []
+
+    def noted(*args: Any, fixed: Any, **kwargs: Any) -> JobResult[Level]:
+        kept.append(list(fixed))
+        return solve(*args, fixed=fixed, **kwargs)
+
+    monkeypatch.setattr(MODULE, "minimise_normal_variation", noted)
+    monkeypatch.setattr(MODULE, "corners_of_surface", lambda *args: most)
+    monkeypatch.setattr(MODULE, "held_corners", lambda *args: most.tolist())
+    made, job = planar_quads(mesh, surface)
+    assert kept[0] == most.tolist()
+    assert kept[-1] == []
+    assert job.holds
+    away = (made.vertices - mesh.vertices).norm(dim=1)[most] / mesh.report["spacing"]
+    (note,) = (note for note in made.notes if "corners of the boundary moved" in note)
+    assert note.startswith(f"{int((away > 1e-9).sum())} of {len(most)} corners of the boundary moved, by up to ")
+    assert f"{float(away.max()):.2g} mean edge" in note
+
+
+def test_a_corner_is_not_held_where_a_face_has_three() -> None:
+    """Of a row of three quads."""
+    topology = Topology.from_faces([[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6]])
+    assert held_corners(topology, torch.tensor([0, 4, 1])) == []
+    assert held_corners(topology, torch.tensor([0, 4])) == [0, 4]
+    assert held_corners(topology, torch.tensor([0, 4, 2, 3, 7])) == [0, 4]
+    assert held_corners(topology, torch.zeros(0, dtype=torch.long)) == []
+
+
+def test_small_faces_do_not_become_slivers():
+    """A mesh whose smallest face at the boundary has a tenth of the mean area; it fell below a twentieth."""
+    surface = graph_over_a_square(500, monkey=True)
+    mesh = principal_quads(*surface, count=150)
+    areas = face_areas(mesh.vertices, mesh.topology)
+    made, job = planar_quads(mesh, surface)
+    now = face_areas(made.vertices, made.topology)
+    assert float(now.min()) >= 0.05 * float(areas.mean())
+    (promise,) = (promise for promise in job.promises if promise.name == "smallest area over the mean")
+    assert promise.holds
+    assert promise.reached == pytest.approx(float(now.min() / areas.mean()))
 
 
 def test_a_solve_that_is_stopped_is_not_followed_by_another(saddle, asked, monkeypatch):

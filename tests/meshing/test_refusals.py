@@ -51,6 +51,21 @@ def test_a_hole_too_small_is_named_and_as_many_faces_as_are_said_go_around_it(sc
     assert len(made.principal.topology.boundary_loops()) == 2
 
 
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
+def test_a_t_junction_is_no_hole_and_its_remedy_works(dtype: torch.dtype) -> None:
+    """A face of a torus is split at the middle of an edge, its neighbour is not."""
+    made = irregular_triangles(Torus(), 400)
+    faces = made.topology.triangles.tolist()
+    a, b, c = faces.pop(60)
+    points = torch.cat([made.vertices, made.vertices[[a, b]].mean(0)[None]]).to(dtype)
+    topology = Topology.from_faces([*faces, [a, len(points) - 1, c], [len(points) - 1, b, c]], len(points))
+    with pytest.raises(NoMeshError, match=r"encloses no area: .*T-junction.*--repair --weld\) closes it$") as caught:
+        principal_quads(points, topology, count=100, settings=MeshingSettings(fallback=False))
+    assert caught.value.vertex in (a, b, len(points) - 1)
+    mended = repair_mesh(points, topology.corners.reshape(-1, 3), weld=True)
+    assert not len(principal_quads(mended.vertices, mended.topology, count=100).topology.boundary_loops())
+
+
 def test_the_first_attempt_that_knows_where_it_failed_is_told() -> None:
     made = irregular_triangles(Torus(), 400)
     (part,) = components_of(made.vertices, made.topology)

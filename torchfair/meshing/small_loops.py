@@ -10,6 +10,7 @@ from ..fields.frames import Floats
 from .surface import DesignSurface
 
 _SHORTEST = 3.0  # spacings: with two, triangles went around the tip of a cone; cells of less collapse
+_SLIT = 1e-6  # of the squared length: area that rounding makes of a loop without any
 
 
 class SmallLoop(NamedTuple):
@@ -19,14 +20,22 @@ class SmallLoop(NamedTuple):
         length: of its edges.
         vertex: number of one of its vertices in the mesh that was given, -1 if none was given.
         place: (3,) where that is.
+        is_slit: whether it encloses no area, as where a vertex lies in the middle of an edge of a neighbour.
     """
 
     length: float
     vertex: int
     place: Floats
+    is_slit: bool
 
     def remedy(self, spacing: float) -> str:
         """What is wrong with edges of a length, and what to do, in words."""
+        if self.is_slit:
+            return (
+                "the boundary loop there encloses no area: a vertex lies on an edge that it does not belong to "
+                "(T-junction), or edges at one place are not joined. torchfair.repair_mesh(..., weld=True) "
+                "(--repair --weld) closes it"
+            )
         times = (_SHORTEST * spacing / self.length) ** 2
         return (
             f"the boundary loop (hole) there is {self.length:.3g} long, edges are to be {spacing:.3g}: close it, or "
@@ -45,4 +54,7 @@ def small_loop(surface: DesignSurface, spacing: float) -> SmallLoop | None:
     numbers = surface.numbers.numpy()[loop]
     given = numbers >= 0
     vertex = loop[given][numbers[given].argmin()] if given.any() else loop[0]
-    return SmallLoop(min(lengths), int(surface.numbers[vertex]), points[vertex])
+    corners = points[loop] - points[loop[0]]
+    area = np.linalg.norm(np.cross(corners, np.roll(corners, -1, axis=0)).sum(0)) / 2
+    is_slit = bool(area <= _SLIT * min(lengths) ** 2)
+    return SmallLoop(min(lengths), int(surface.numbers[vertex]), points[vertex], is_slit)

@@ -81,6 +81,8 @@ class FairSettings:
         direction_weight: Weight of half the squared sideways components of edges that keep their directions.
         smallest_angle: No corner angle falls below this (or below the smallest of the input), radians.
         smallest_area: No face falls below this fraction of its area.
+        smallest_share: Nor below this fraction of the mean area, or nine tenths of its own where that is less; where
+            ``smallest_area`` is 0 this does not count either.
         smallest_edge: No side of a polygon with more than three corners falls below this fraction of its length, or of
             the mean edge length where that is less. (Those of triangles are kept by angle and area.)
         largest_area: No face grows above this many times its area, or half the mean area where that is more, unless
@@ -125,6 +127,7 @@ class FairSettings:
     direction_weight: float = 30.0
     smallest_angle: float = setting(math.radians(10.0), unit="radians")
     smallest_area: float = 0.2
+    smallest_share: float = 0.0
     smallest_edge: float = 0.2
     largest_area: float = 3.0
     faces_may_turn: bool = False
@@ -203,7 +206,7 @@ class FairSettings:
         check_number("largest_area", self.largest_area, least=1.0)
         check_number("reference_distance", self.reference_distance, above=True)
         check_number("distance_back", self.distance_back, above=True)
-        for name in ("smallest_area", "smallest_edge"):
+        for name in ("smallest_area", "smallest_share", "smallest_edge"):
             check_number(name, getattr(self, name), most=1.0)
         check_angles(self)
         check_number("smoothing", self.smoothing, above=True, finite=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from functools import cached_property
 
+import torch
 from torch import Tensor
 
 from ... import constraints as c
@@ -18,6 +19,7 @@ from .short_sides import ShortSides
 
 _SAFE_ANGLE = math.radians(25.0)  # from where on the barrier of angles is silent
 _LEAST_SAFETY = math.radians(2.0)
+KEPT_OF_OWN = 0.9  # area of a face that starts smaller than all are to be
 
 
 class FaceBounds:
@@ -40,6 +42,15 @@ class FaceBounds:
         """Radians that no corner angle falls below: that of the start where it is smaller than asked."""
         return min(settings.smallest_angle, float(self._angles.min()) * (1.0 - 1e-9))
 
+    def smallest_areas(self, settings: FairSettings) -> Tensor:
+        """(F,) that no face falls below."""
+        own = face_areas(self._vertices, self._topology)
+        if not (own.numel() and settings.smallest_area and settings.smallest_share):
+            return settings.smallest_area * own
+        return torch.maximum(
+            settings.smallest_area * own, (KEPT_OF_OWN * own).clamp_max(settings.smallest_share * own.mean())
+        )
+
     def largest_areas(self, settings: FairSettings) -> Tensor | None:
         """(F,) that no face exceeds; None for no bound."""
         bounded = settings.quality_weight and 0.0 < settings.largest_area < math.inf
@@ -51,11 +62,13 @@ class FaceBounds:
         """Barriers at the bounds."""
         smallest, weight = self.smallest_angle(settings), settings.quality_weight
         safe = self._angles.clamp(max=max(_SAFE_ANGLE, 2.0 * smallest)).clamp_min(smallest + _LEAST_SAFETY)
-        areas, most = face_areas(self._vertices, self._topology), self.largest_areas(settings)
+        least, most = self.smallest_areas(settings), self.largest_areas(settings)
+        share = settings.smallest_area
+        areas = least / share if share else face_areas(self._vertices, self._topology)
         return [
             *([] if most is None else growth_terms(self._topology, most, weight=weight)),
             *c.corner_angle_terms(self._topology, smallest, safe, weight=weight),
-            *c.face_area_terms(self._topology, areas, smallest=settings.smallest_area, weight=weight),
+            *c.face_area_terms(self._topology, areas, smallest=share, weight=weight),
             *self.sides.terms(self._topology, settings.smallest_edge, weight=weight),
         ]
 

@@ -26,7 +26,7 @@ class FairGuard:
         topology: Connectivity.
         placed: The vertices (V, 3) of the mesh of a state.
         smallest_angle: No corner angle may be smaller, radians.
-        smallest_area: No face may be smaller than this fraction of its area at the start.
+        smallest_areas: (F,) no face may be smaller.
         sides: Of polygons with more than three corners.
         smallest_edge: None of them may be shorter than this fraction of their lengths.
         largest_areas: (F,) no face may be larger; None for no bound.
@@ -41,7 +41,7 @@ class FairGuard:
         placed: Callable[[State], Tensor],
         *,
         smallest_angle: float,
-        smallest_area: float,
+        smallest_areas: Tensor,
         sides: ShortSides,
         smallest_edge: float,
         largest_areas: Tensor | None,
@@ -53,8 +53,7 @@ class FairGuard:
         self._largest_areas, self._may_turn = largest_areas, may_turn
         self._sides, self._smallest_edge = sides, smallest_edge
         self._start = _Mesh(vertices, topology)
-        areas = norm(self._start.area_vectors)
-        self._smallest_areas, self._upright = smallest_area * areas, _UPRIGHT * areas
+        self._smallest_areas, self._upright = smallest_areas, _UPRIGHT * norm(self._start.area_vectors)
         self._known: list[tuple[Tensor, _Mesh]] = []
 
     def keeps_faces(self, state: State, trial: State) -> bool:

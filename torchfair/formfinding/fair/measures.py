@@ -17,6 +17,7 @@ from ...geometry.planarity import planarity
 from ...normalisation import Normalisation
 from ..job.promises import Promise, handle_promise
 from .crossing_sides import crossing_sides
+from .face_bounds import KEPT_OF_OWN
 from .panel_sizes import sizes_of
 from .panels import PLANAR_PROMISE
 from .problem import FairProblem
@@ -41,8 +42,9 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         from the nearer of both; ``largest_distance_back`` from vertices of the reference surface to this one,
         and ``largest_distance_back_relative``; ``largest_boundary_distance`` of gliding vertices from their
         curve. ``smallest_angle_degrees``; ``smallest_area_ratio``, ``largest_area_ratio`` and ``flipped_faces``
-        against the start, ``crossing_faces``, whose sides cross by more than rounding, ``smallest_edge_ratio`` of the
-        sides of polygons, ``largest_growth`` against the larger of a face's own area and half the mean.
+        against the start, ``smallest_area_share`` over the mean of the start, ``crossing_faces``, whose sides cross by
+        more than rounding, ``smallest_edge_ratio`` of the sides of polygons, ``largest_growth`` against the larger of
+        a face's own area and half the mean.
         ``largest_planarity`` of the faces kept planar and ``largest_planarity_of_all`` polygons (diagonal distance over
         mean edge of the face), ``largest_planarity_growth`` of those that are nearly planar. ``largest_fold_degrees``
         of the edges kept flat. ``largest_handle_distance``.
@@ -83,6 +85,7 @@ def fair_measures(vertices: Tensor, start: Tensor, problem: FairProblem, unit: N
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
         "smallest_area_ratio": float(ratios.min()),
         "largest_area_ratio": float(ratios.max()),
+        "smallest_area_share": float(areas.min() / own_areas.mean()),
         "largest_growth": float(growth.max()),
         "smallest_edge_ratio": float(sides.min()) if sides.numel() else 1.0,
         "shortest_edge": float(lengths.min()),
@@ -144,6 +147,10 @@ def _face_promises(problem: FairProblem, before: Mapping[str, float], after: Map
         promises.append(Promise("smallest angle", least, reached, "at least", "degrees", of_settings=asked))
         area = after["smallest_area_ratio"]
         promises.append(Promise("smallest area against its own", settings.smallest_area, area, "at least"))
+        if settings.smallest_area and settings.smallest_share:
+            asked, reached = settings.smallest_share, after["smallest_area_share"]
+            least = min(asked, KEPT_OF_OWN * before["smallest_area_share"])
+            promises.append(Promise("smallest area over the mean", least, reached, "at least", of_settings=asked))
         if problem.bounds.sides.edges.numel():
             edge, name = after["smallest_edge_ratio"], "shortest side of a polygon against its own"
             promises.append(Promise(name, settings.smallest_edge, edge, "at least"))

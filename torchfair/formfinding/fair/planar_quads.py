@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from ...projection import Callback
 from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level
+from .kept_corners import corners_of_surface, held_corners
 from .panels import PLANAR_PROMISE
 from .planarity_goal import KEEP_LIMIT
 from .recipe import minimise_normal_variation
@@ -29,10 +31,12 @@ PLANAR_QUADS = FairSettings(
     direction_weight=300.0,
     energy_weight=10.0,
     largest_area=1.5,
+    smallest_share=0.05,
 )
 """Planar polygons at most 3 % of a mean edge from the surface, with edges that keep their directions.
 
-Panels grow by half at most: since edges of the boundary have no E, panels there would grow threefold.
+Panels grow by half at most: since edges of the boundary have no E, panels there would grow threefold. None becomes less
+than a twentieth of the mean.
 """
 
 _TURNED = 1.0  # degrees in the mean, beyond which edges turn too far
@@ -41,6 +45,11 @@ _LITTLE = 0.5  # degrees in the mean, up to which edges may turn farther for les
 _LEAST = 1.01  # E over C, beyond which they do
 _SOFTER = replace(PLANAR_QUADS, direction_weight=100.0)
 _LITTLE_SOFTER = replace(PLANAR_QUADS, direction_weight=200.0)
+_STAYS = 1e-9  # of an edge
+_FIXED = re.compile(r"\d+ vert(ices are|ex is) fixed")  # a note: these are corners
+_REMEDY = (
+    "ask for more faces, which are more nearly planar before, or make a rough surface smooth first: torchfair denoise"
+)
 _NEARLY = 0.01  # planarity in mean edges of a face, from which other settings may make panels planar
 
 
@@ -58,6 +67,9 @@ def planar_quads(
     - where that keeps its promises but E ends above 1.01 C, and edges turned by at most half a degree. Directions count
       a third then, and what has less E is taken, if edges turn by at most 1 degree.
 
+    Corners of the boundary of the surface stay in their places, but for those of faces with three of them; all may move
+    where panels become planar only then, as where a rough boundary turns everywhere.
+
     The result of a second solve is taken only where it keeps promises and limits as well as the first does; vertices
     may end as far from the surface as they were before.
 
@@ -69,7 +81,8 @@ def planar_quads(
     Returns:
         The mesh with its vertices moved, and the job with its promises. The report of the mesh is that of the result,
         with the one before under ``before_planar``. Notes say where faces had to leave the surface farther than that,
-        and where edges turned away from principal directions by more than 1 degree in the mean.
+        where edges turned away from principal directions by more than 1 degree in the mean, and how far corners of
+        the boundary moved.
 
     Raises:
         ShapeError: if the surface is not one mesh.
@@ -88,29 +101,44 @@ def planar_quads(
     from ...meshing.nearest_directions import NearestDirections
 
     directions = NearestDirections(mesh.surface, mesh.report["spacing"])
+    corners = corners_of_surface(mesh.vertices, surface, mesh.report["spacing"], PLANAR_QUADS.corner_angle)
+    held = held_corners(mesh.topology, corners)
 
-    def solved(settings: FairSettings) -> _Solved:
+    def solved(settings: FairSettings, held: Sequence[int]) -> _Solved:
         job = minimise_normal_variation(
             mesh.vertices,
             mesh.topology,
             reference=surface,
             directions_at=directions,
+            fixed=held,
             settings=settings,
             callback=callback,
         )
         return job, {**measure_mesh_on(job.vertices, mesh), "before_planar": mesh.report}
 
-    job, report = solved(PLANAR_QUADS)
-    again = None if job.stopped else _again(report, holds=job.holds)
-    if again is not None:
-        settings, is_better = again
-        other = solved(settings)
-        if _is_as_good(other[0], job) and is_better(other[1], report):
+    def best(held: Sequence[int]) -> _Solved:
+        job, report = solved(PLANAR_QUADS, held)
+        again = None if job.stopped else _again(report, holds=job.holds)
+        if again is not None:
+            settings, is_better = again
+            other = solved(settings, held)
+            if _is_as_good(other[0], job) and is_better(other[1], report):
+                return other
+            if other[0].stopped:
+                job = _stopped_like(other[0], job)
+        return job, report
+
+    job, report = best(held)
+    if held and report["planarity_max"] > PLANAR_PROMISE and not job.stopped:
+        other = best([])
+        if other[1]["planarity_max"] < report["planarity_max"]:
             job, report = other
         elif other[0].stopped:
             job = _stopped_like(other[0], job)
     solve = f"{job.steps} steps towards planar polygons: {job.message}"
-    said = [*mesh.notes, *map(_in_counts, job.notes), *_turned(report), solve]
+    moved = (job.vertices - mesh.vertices).norm(dim=1)[corners.to(mesh.vertices.device)] / mesh.report["spacing"]
+    job = _in_counts(job)
+    said = [*mesh.notes, *job.notes, *_turned(report), *_moved(moved), solve]
     return replace(mesh, vertices=job.vertices, report=report, notes=said), job
 
 
@@ -158,8 +186,27 @@ def _stopped_like(stopped: JobResult[Level], job: JobResult[Level]) -> JobResult
     return replace(job, levels=[*levels, replace(last, runs=[*last.runs[:-1], end])], stopped=True)
 
 
-def _in_counts(note: str) -> str:
-    """A note of a job with what a mesh can be asked for in place of its settings, which are always the same."""
+def _moved(shares: Tensor) -> list[str]:
+    """Which corners of the boundary are no longer in their places (n,) spacings away, in words."""
+    away = shares[shares > _STAYS]
+    if not len(away):
+        return []
+    return [
+        f"{len(away)} of {len(shares)} corners of the boundary moved, by up to {float(away.max()):.2g} mean edge "
+        "lengths, so that faces are planar"
+    ]
+
+
+def _in_counts(job: JobResult[Level]) -> JobResult[Level]:
+    """A job with what a mesh can be asked for in place of its settings, which are always the same."""
+    *levels, last = job.levels
+    promises = [replace(promise, remedy=_REMEDY) for promise in last.promises]
+    known = {str(old): str(new) for old, new in zip(last.promises, promises, strict=True)}
+    notes = [known.get(note) or _without_limit(note) for note in job.notes if not _FIXED.fullmatch(note)]
+    return replace(job, levels=[*levels, replace(last, promises=promises)], notes=notes)
+
+
+def _without_limit(note: str) -> str:
     said = note.removesuffix(KEEP_LIMIT)
     return note if said == note else f"{said}. Ask for more faces, which are more nearly planar before"
 

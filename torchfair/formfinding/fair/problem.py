@@ -291,7 +291,7 @@ class FairProblem:
             self.topology,
             self.placed,
             smallest_angle=bounded * self.bounds.smallest_angle(self.settings),
-            smallest_area=bounded * self.settings.smallest_area,
+            smallest_areas=bounded * self.bounds.smallest_areas(self.settings),
             sides=self.bounds.sides,
             smallest_edge=bounded * self.settings.smallest_edge,
             largest_areas=self.bounds.largest_areas(self.settings),
