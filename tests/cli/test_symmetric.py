@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -207,6 +208,20 @@ def test_a_family_across_the_directions_is_warned_of(tmp_path: Path, capsys: pyt
     out = capsys.readouterr().out
     assert "WARNING: edges at random are 22 degrees off" in out
     assert "--seed V W" in out
+
+
+def test_strips_longer_than_a_sheet_name_the_option_in_millimetres(
+    torus: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They are measured once the design is solved, which is kept; what is said to be needed is enough."""
+    output = torus.with_name("long.obj")
+    words = ["symmetric", str(torus), "-o", str(output), "--no-pictures", "--strips", "0.2", "--millimetres", "100"]
+    assert main([*words, "--sheet-width", "60"]) == 1
+    said = capsys.readouterr()
+    (needed,) = re.findall(r"a strip needs --sheet-width ([\d.]+) mm with gaps, 60 were given", said.out + said.err)
+    assert output.exists()
+    assert "sheet_width" not in said.out + said.err
+    assert main([*words, "--force", "--sheet-width", str(1.00001 * float(needed))]) == 0
 
 
 def test_strips_on_sheets_in_millimetres(torus: Path, capsys: pytest.CaptureFixture[str]) -> None:

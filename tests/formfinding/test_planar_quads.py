@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import sys
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -113,6 +114,8 @@ def test_where_edges_turn_too_far_directions_count_more_and_what_is_left_is_said
         (1.011, 0.2, False, 0.011, None, ""),  # what is far from planar would not become so
         (1.011, 1.1, True, 1e-4, "_STIFFER", "_turns_less"),
         (0.9, 1.1, False, 0.011, "_STIFFER", "_turns_less"),
+        (0.9, 1.1, False, 0.1, "_STIFFER", "_turns_less"),
+        (0.9, 1.1, False, 0.11, None, ""),
         (0.9, 1.1, False, 0.01, "_LITTLE_SOFTER", "_is_planar"),
         (0.9, 0.7, False, 1.1e-4, "_LITTLE_SOFTER", "_is_planar"),
         (None, 0.0, False, 0.003, "_LITTLE_SOFTER", "_is_planar"),
@@ -132,6 +135,18 @@ def test_what_follows_the_first_solve(ratio, turn, holds, warp, follows, is_bett
         settings, better = found
         assert settings is getattr(MODULE, follows)
         assert better is getattr(MODULE, is_better)
+
+
+def test_nothing_more_is_tried_where_panels_are_far_from_planar(saddle, asked, monkeypatch):
+    surface, mesh = saddle
+    for warp, solves in ((0.11, 1), (0.09, 2)):
+        asked.clear()
+        measured = partial(
+            lambda vertices, of, warp: {**measure_mesh_on(vertices, of), "planarity_max": warp}, warp=warp
+        )
+        monkeypatch.setattr("torchfair.meshing.measure_mesh_on", measured)
+        planar_quads(mesh, surface)
+        assert asked == solves * [PLANAR_QUADS]
 
 
 @pytest.mark.parametrize(("second", "taken"), [(9e-5, True), (1.1e-4, False)])

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import TorchfairError
 from .arguments import non_negative
 from .errors import CommandError
 from .request import Request, Writer
@@ -83,14 +84,25 @@ class StripFiles:
         return files | ({"strips.dxf": self._drawing} if self._dxf else {})
 
     def make(self, vertices: Tensor, polylines: list[Tensor], normals: Tensor) -> dict[str, float]:
-        """Makes the strips; how true they are, nothing if none were asked for."""
+        """Makes the strips; how true they are, nothing if none were asked for.
+
+        Raises:
+            TorchfairError: if they cannot be made or find no room, in words of the command.
+        """
         from ..principal import developable_strips
+        from ..principal._sheet import SheetError
 
         if self._height is None:
             return {}
-        self._made = strips = developable_strips(
-            vertices, polylines, normals, self._height, depth=self._depth, **self._sheet
-        )
+        try:
+            self._made = strips = developable_strips(
+                vertices, polylines, normals, self._height, depth=self._depth, **self._sheet
+            )
+        except SheetError as error:
+            option, unit = f"--{error.side.replace('_', '-')}", self._millimetres
+            raise TorchfairError(
+                f"a strip needs {option} {unit * error.needed:.6g} mm with gaps, {unit * error.given:.6g} were given"
+            ) from None
         return {
             "strips": len(strips.names),
             "quads": strips.topology.num_faces,

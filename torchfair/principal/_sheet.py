@@ -11,6 +11,19 @@ from ..errors import TorchfairError
 from ._unroll import Floats
 
 
+class SheetError(TorchfairError):
+    """A sheet on which a strip finds no room.
+
+    Attributes:
+        side: ``"sheet_width"`` or ``"sheet_height"``.
+        needed, given: lengths in the unit of the strips.
+    """
+
+    def __init__(self, side: str, needed: float, given: float) -> None:
+        super().__init__(f"{side}: a strip needs {needed:.6g} with gaps, the sheet has {given:.6g}")
+        self.side, self.needed, self.given = side, needed, given
+
+
 def upright(flat: Floats) -> Floats:
     """The points (n, 2, 2) turned so that their bounding box is smallest, its long side along x, a corner at 0."""
     from scipy.spatial import ConvexHull
@@ -53,17 +66,17 @@ def shelves(boxes: Floats, gap: float, width: float | None, height: float | None
     With a height there are as many sheets as it takes, one above the other.
 
     Raises:
-        TorchfairError: if a box is broader or higher than the sheet.
+        SheetError: if a box is broader or higher than the sheet.
     """
     if not len(boxes):
         return Layout(boxes, 0.0, 0.0)
     broadest = float(boxes[:, 0].max()) + 2 * gap
     highest = float(boxes[:, 1].max()) + 2 * gap
     if height is not None and height < highest * (1 - 1e-9):
-        raise TorchfairError(f"sheet_height: a strip needs {highest:.6g} with gaps, the sheet has {height:.6g}")
+        raise SheetError("sheet_height", highest, height)
     if width is not None:
         if width < broadest * (1 - 1e-9):
-            raise TorchfairError(f"sheet_width: a strip needs {broadest:.6g} with gaps, the sheet has {width:.6g}")
+            raise SheetError("sheet_width", broadest, width)
         return _first_fit(boxes, gap, width, height)._replace(width=width)
     square = math.sqrt(float((boxes + gap).prod(1).sum()))
     tried = [_first_fit(boxes, gap, max(broadest, square * step / 8), height) for step in range(8, 17)]

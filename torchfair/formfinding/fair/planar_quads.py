@@ -50,6 +50,7 @@ _FIXED = re.compile(r"\d+ vert(ices are|ex is) fixed")  # a note: these are corn
 _REMEDY = (
     "ask for more faces, which are more nearly planar before, or make a rough surface smooth first: torchfair denoise"
 )
+_HOPELESS = 0.1  # planarity in mean edges of a face, beyond which nothing more is tried
 _NEARLY = 0.01  # planarity in mean edges of a face, from which other settings may make panels planar
 
 
@@ -69,6 +70,8 @@ def planar_quads(
 
     Corners of the boundary of the surface stay in their places, but for those of faces with three of them; all may move
     where panels become planar only then, as where a rough boundary turns everywhere.
+
+    There is none where the first is far from planar, by more than 0.1.
 
     The result of a second solve is taken only where it keeps promises and limits as well as the first does; vertices
     may end as far from the surface as they were before.
@@ -129,7 +132,7 @@ def planar_quads(
         return job, report
 
     job, report = best(held)
-    if held and report["planarity_max"] > PLANAR_PROMISE and not job.stopped:
+    if held and PLANAR_PROMISE < report["planarity_max"] <= _HOPELESS and not job.stopped:
         other = best([])
         if other[1]["planarity_max"] < report["planarity_max"]:
             job, report = other
@@ -145,6 +148,8 @@ def planar_quads(
 def _again(report: Mapping[str, Any], *, holds: bool) -> tuple[FairSettings, _IsBetter] | None:
     """The settings of a second solve after one with such a report, and when it is better; None if that was enough."""
     turn, ratio = _turn(report), report["variation_over_curvature"]
+    if report["planarity_max"] > _HOPELESS:
+        return None
     if PLANAR_PROMISE < report["planarity_max"] <= _NEARLY:
         return _LITTLE_SOFTER, _is_planar
     if turn > _TURNED:
