@@ -66,6 +66,27 @@ def test_a_t_junction_is_no_hole_and_its_remedy_works(dtype: torch.dtype) -> Non
     assert not len(principal_quads(mended.vertices, mended.topology, count=100).topology.boundary_loops())
 
 
+def test_a_small_disk_has_no_hole_that_could_be_closed() -> None:
+    """Beside a square a hundred times as large, in which there is room."""
+    steps = torch.linspace(0, 1, 11, dtype=torch.float64)
+    x, y = (of.reshape(-1) for of in torch.meshgrid(steps, steps, indexing="ij"))
+    square = torch.stack([x, y, 0.1 * x * y], 1)
+    at = torch.arange(121).reshape(11, 11)
+    a, b, c, d = (of.reshape(-1) for of in (at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]))
+    faces = torch.cat([torch.stack([a, b, c], 1), torch.stack([a, c, d], 1)])
+    u, v = 2 * x - 1, 2 * y - 1
+    disk = torch.stack([u * (1 - v**2 / 2).sqrt(), v * (1 - u**2 / 2).sqrt(), 0.1 * u * v], 1)
+    points = torch.cat([square, 0.005 * disk + 3])
+    with pytest.raises(NoMeshError) as caught:
+        principal_quads(points, Topology.from_faces(torch.cat([faces, faces + 121])), count=60)
+    said = str(caught.value)
+    assert "; the boundary there is 0.03" in said
+    assert "close" not in said
+    times = float(re.findall(r"about ([\d.e+]+) times as many faces", said)[0])
+    made = principal_quads(points, Topology.from_faces(torch.cat([faces, faces + 121])), count=round(60 * times))
+    assert len(made.topology.boundary_loops()) == 2
+
+
 def test_the_first_attempt_that_knows_where_it_failed_is_told() -> None:
     made = irregular_triangles(Torus(), 400)
     (part,) = components_of(made.vertices, made.topology)

@@ -52,7 +52,8 @@ def principal_quads(
 
     Returns:
         The mesh. Its report has ``angle_mean_degrees`` and ``angle_95_degrees`` between inner edges and
-        principal directions (None where there are none), ``planarity_mean`` and ``planarity_max``
+        principal directions (None where the principal curvatures differ by less than 0.02 over the spacing),
+        ``planarity_mean`` and ``planarity_max``
         (:func:`torchfair.geometry.planarity`), ``normal_variation`` (E), ``total_absolute_curvature`` (C, of
         the smooth surface through the vertices, with ``l l*`` of creases) and their ratio
         ``variation_over_curvature`` (None for flat surfaces), ``distance_max`` of the middles of edges and

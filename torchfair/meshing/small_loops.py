@@ -20,12 +20,14 @@ class SmallLoop(NamedTuple):
         length: of its edges.
         vertex: number of one of its vertices in the mesh that was given, -1 if none was given.
         place: (3,) where that is.
+        is_hole: whether the surface has another loop.
         is_slit: whether it encloses no area, as where a vertex lies in the middle of an edge of a neighbour.
     """
 
     length: float
     vertex: int
     place: Floats
+    is_hole: bool
     is_slit: bool
 
     def remedy(self, spacing: float) -> str:
@@ -37,9 +39,10 @@ class SmallLoop(NamedTuple):
                 "(--repair --weld) closes it"
             )
         times = (_SHORTEST * spacing / self.length) ** 2
+        name, close = ("boundary loop (hole)", "close it, or ") if self.is_hole else ("boundary", "")
         return (
-            f"the boundary loop (hole) there is {self.length:.3g} long, edges are to be {spacing:.3g}: close it, or "
-            f"ask for edges of {self.length / _SHORTEST:.3g} or less, which are about {times:.2g} times as many faces"
+            f"the {name} there is {self.length:.3g} long, edges are to be {spacing:.3g}: {close}ask for edges of "
+            f"{self.length / _SHORTEST:.3g} or less, which are about {times:.2g} times as many faces"
         )
 
 
@@ -57,4 +60,12 @@ def small_loop(surface: DesignSurface, spacing: float) -> SmallLoop | None:
     corners = points[loop] - points[loop[0]]
     area = np.linalg.norm(np.cross(corners, np.roll(corners, -1, axis=0)).sum(0)) / 2
     is_slit = bool(area <= _SLIT * min(lengths) ** 2)
-    return SmallLoop(min(lengths), int(surface.numbers[vertex]), points[vertex], is_slit)
+    return SmallLoop(
+        min(lengths), int(surface.numbers[vertex]), points[vertex], len(loops) > 1 or not _is_disk(surface), is_slit
+    )
+
+
+def _is_disk(surface: DesignSurface) -> bool:
+    topology = surface.topology
+    used = int((topology.valences > 0).sum())
+    return used - topology.num_edges + topology.num_faces == 1

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from torch import Tensor
 
-from ...projection import Callback
+from ...projection import Callback, Status
 from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level
@@ -36,7 +36,7 @@ PLANAR_QUADS = FairSettings(
 """Planar polygons at most 3 % of a mean edge from the surface, with edges that keep their directions.
 
 Panels grow by half at most: since edges of the boundary have no E, panels there would grow threefold. None becomes less
-than a twentieth of the mean.
+than a twentieth of the mean, or than nine tenths of what it was where that is less.
 """
 
 _TURNED = 1.0  # degrees in the mean, beyond which edges turn too far
@@ -51,6 +51,7 @@ _REMEDY = (
     "ask for more faces, which are more nearly planar before, or make a rough surface smooth first: torchfair denoise"
 )
 _HOPELESS = 0.1  # planarity in mean edges of a face, beyond which nothing more is tried
+_MOST_STEPS = 250  # of a solve after which directions are not weighed anew
 _NEARLY = 0.01  # planarity in mean edges of a face, from which other settings may make panels planar
 
 
@@ -71,7 +72,8 @@ def planar_quads(
     Corners of the boundary of the surface stay in their places, but for those of faces with three of them; all may move
     where panels become planar only then, as where a rough boundary turns everywhere.
 
-    There is none where the first is far from planar, by more than 0.1.
+    There is none where the first is far from planar, by more than 0.1; and those for directions and E there are only
+    if it took at most 250 steps.
 
     The result of a second solve is taken only where it keeps promises and limits as well as the first does; vertices
     may end as far from the surface as they were before.
@@ -121,7 +123,7 @@ def planar_quads(
 
     def best(held: Sequence[int]) -> _Solved:
         job, report = solved(PLANAR_QUADS, held)
-        again = None if job.stopped else _again(report, holds=job.holds)
+        again = None if job.stopped else _again(report, holds=job.holds, steps=job.steps)
         if again is not None:
             settings, is_better = again
             other = solved(settings, held)
@@ -138,20 +140,22 @@ def planar_quads(
             job, report = other
         elif other[0].stopped:
             job = _stopped_like(other[0], job)
-    solve = f"{job.steps} steps towards planar polygons: {job.message}"
+    solve = f"{job.steps} steps towards planar polygons: {_ending(job)}"
     moved = (job.vertices - mesh.vertices).norm(dim=1)[corners.to(mesh.vertices.device)] / mesh.report["spacing"]
     job = _in_counts(job)
     said = [*mesh.notes, *job.notes, *_turned(report), *_moved(moved), solve]
     return replace(mesh, vertices=job.vertices, report=report, notes=said), job
 
 
-def _again(report: Mapping[str, Any], *, holds: bool) -> tuple[FairSettings, _IsBetter] | None:
-    """The settings of a second solve after one with such a report, and when it is better; None if that was enough."""
+def _again(report: Mapping[str, Any], *, holds: bool, steps: int) -> tuple[FairSettings, _IsBetter] | None:
+    """The settings of a second solve after one of so many steps, and when it is better; None if that was enough."""
     turn, ratio = _turn(report), report["variation_over_curvature"]
     if report["planarity_max"] > _HOPELESS:
         return None
     if PLANAR_PROMISE < report["planarity_max"] <= _NEARLY:
         return _LITTLE_SOFTER, _is_planar
+    if steps > _MOST_STEPS:
+        return None
     if turn > _TURNED:
         return _STIFFER, _turns_less
     if holds and turn <= _LITTLE and ratio is not None and ratio > _LEAST:
@@ -198,7 +202,7 @@ def _moved(shares: Tensor) -> list[str]:
         return []
     return [
         f"{len(away)} of {len(shares)} corners of the boundary moved, by up to {float(away.max()):.2g} mean edge "
-        "lengths, so that faces are planar"
+        "lengths"
     ]
 
 
@@ -209,6 +213,13 @@ def _in_counts(job: JobResult[Level]) -> JobResult[Level]:
     known = {str(old): str(new) for old, new in zip(last.promises, promises, strict=True)}
     notes = [known.get(note) or _without_limit(note) for note in job.notes if not _FIXED.fullmatch(note)]
     return replace(job, levels=[*levels, replace(last, promises=promises)], notes=notes)
+
+
+def _ending(job: JobResult[Level]) -> str:
+    """How the solve ended, without what settings of a solve could do about it."""
+    status = job.projection.status
+    words = {Status.MAX_ITERATIONS: "ended after as many as there may be", Status.STALLED: "not converged"}
+    return job.message.replace(status.value, words.get(status, status.value), 1)
 
 
 def _without_limit(note: str) -> str:
