@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from scipy.spatial import KDTree
 from torch import Tensor
 
 from ...boundary import boundary_corners
@@ -25,6 +24,8 @@ def corners_of_surface(
         spacing: length of edges of the mesh.
         corner_angle: the boundary has a corner where it turns by more, radians.
     """
+    from scipy.spatial import KDTree  # here, because the page of designs would wait for it
+
     points, topology = surface
     corners = points[boundary_corners(points, topology, corner_angle)].double().cpu()
     if not len(corners):
