@@ -36,6 +36,11 @@ class IntegerSplit:
         """(2N, k) of y."""
         return (self.whole @ sp.csr_matrix(self.basis.astype(float))).tocsr()
 
+    @cached_property
+    def real(self) -> sp.csr_matrix:
+        """(2N, n + k) of x and y as real values, one after the other."""
+        return sp.hstack([self.free, self.moves]).tocsr()
+
 
 def split_integers(frames: FaceFrames, graph: CutGraph, seams: Seams, runs: list[BoundaryRun]) -> IntegerSplit:
     """Separates free values from whole numbers.

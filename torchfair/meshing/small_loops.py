@@ -7,9 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..fields.frames import Floats
+from .polygon_area import area_vector
 from .surface import DesignSurface
+from .verification import shape_of
 
 _SHORTEST = 3.0  # spacings: with two, triangles went around the tip of a cone; cells of less collapse
+_OF_A_DISK = 1  # Euler number
 _SLIT = 1e-6  # of the squared length: area that rounding makes of a loop without any
 
 
@@ -20,7 +23,7 @@ class SmallLoop(NamedTuple):
         length: of its edges.
         vertex: number of one of its vertices in the mesh that was given, -1 if none was given.
         place: (3,) where that is.
-        is_hole: whether the surface has another loop.
+        is_hole: whether the surface is more than a disk with this rim.
         is_slit: whether it encloses no area, as where a vertex lies in the middle of an edge of a neighbour.
     """
 
@@ -57,15 +60,6 @@ def small_loop(surface: DesignSurface, spacing: float) -> SmallLoop | None:
     numbers = surface.numbers.numpy()[loop]
     given = numbers >= 0
     vertex = loop[given][numbers[given].argmin()] if given.any() else loop[0]
-    corners = points[loop] - points[loop[0]]
-    area = np.linalg.norm(np.cross(corners, np.roll(corners, -1, axis=0)).sum(0)) / 2
-    is_slit = bool(area <= _SLIT * min(lengths) ** 2)
-    return SmallLoop(
-        min(lengths), int(surface.numbers[vertex]), points[vertex], len(loops) > 1 or not _is_disk(surface), is_slit
-    )
-
-
-def _is_disk(surface: DesignSurface) -> bool:
-    topology = surface.topology
-    used = int((topology.valences > 0).sum())
-    return used - topology.num_edges + topology.num_faces == 1
+    is_hole = shape_of(surface.topology).euler_number != _OF_A_DISK
+    is_slit = bool(np.linalg.norm(area_vector(points, loop.tolist())) <= _SLIT * min(lengths) ** 2)
+    return SmallLoop(min(lengths), int(surface.numbers[vertex]), points[vertex], is_hole, is_slit)

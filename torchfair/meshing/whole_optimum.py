@@ -13,7 +13,7 @@ from ..linear import Factor, LinearSolver, factorise
 from .integers import IntegerSplit
 
 _AT_ONCE = 32  # columns that are solved for in one go: these stay near the processor
-_SHIFT = 1e-13  # of the largest eigenvalue: some numbers may change nothing
+_SHIFT = 1e-13  # of the largest eigenvalue, or diagonal entry where that is not known: some numbers may change nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +73,11 @@ def whole_optimum(rows: sp.csr_matrix, right: Floats, split: IntegerSplit, solve
 
 def real_optimum(rows: sp.csr_matrix, right: Floats, split: IntegerSplit, solver: LinearSolver) -> Floats:
     """(2N,) parts of the same where whole numbers may be any numbers."""
-    moves = sp.hstack([split.free, split.moves]).tocsr()
-    slope = (rows @ moves).tocsc()
+    slope = (rows @ split.real).tocsc()
     normal = (slope.T @ slope).tocsr()
     shifted = normal + sp.identity(normal.shape[0]) * _SHIFT * normal.diagonal().max()
     best = solved(factorise(shifted.tocsr(), solver=solver), slope.T @ (right - rows @ split.fixed))
-    return np.asarray(moves @ best + split.fixed, np.float64)
+    return np.asarray(split.real @ best + split.fixed, np.float64)
 
 
 def solved(factor: Factor, right: Floats) -> Floats:

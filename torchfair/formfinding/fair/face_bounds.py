@@ -44,12 +44,7 @@ class FaceBounds:
 
     def smallest_areas(self, settings: FairSettings) -> Tensor:
         """(F,) that no face falls below."""
-        own = face_areas(self._vertices, self._topology)
-        if not (own.numel() and settings.smallest_area and settings.smallest_share):
-            return settings.smallest_area * own
-        return torch.maximum(
-            settings.smallest_area * own, (KEPT_OF_OWN * own).clamp_max(settings.smallest_share * own.mean())
-        )
+        return settings.smallest_area * self._sizes(settings)
 
     def largest_areas(self, settings: FairSettings) -> Tensor | None:
         """(F,) that no face exceeds; None for no bound."""
@@ -62,15 +57,21 @@ class FaceBounds:
         """Barriers at the bounds."""
         smallest, weight = self.smallest_angle(settings), settings.quality_weight
         safe = self._angles.clamp(max=max(_SAFE_ANGLE, 2.0 * smallest)).clamp_min(smallest + _LEAST_SAFETY)
-        least, most = self.smallest_areas(settings), self.largest_areas(settings)
-        share = settings.smallest_area
-        areas = least / share if share else face_areas(self._vertices, self._topology)
+        areas, most = self._sizes(settings), self.largest_areas(settings)
         return [
             *([] if most is None else growth_terms(self._topology, most, weight=weight)),
             *c.corner_angle_terms(self._topology, smallest, safe, weight=weight),
-            *c.face_area_terms(self._topology, areas, smallest=share, weight=weight),
+            *c.face_area_terms(self._topology, areas, smallest=settings.smallest_area, weight=weight),
             *self.sides.terms(self._topology, settings.smallest_edge, weight=weight),
         ]
+
+    def _sizes(self, settings: FairSettings) -> Tensor:
+        """(F,) areas of which faces keep the fraction ``smallest_area``: their own, or more for a share of the mean."""
+        own = face_areas(self._vertices, self._topology)
+        if not (own.numel() and settings.smallest_area and settings.smallest_share):
+            return own
+        least = (KEPT_OF_OWN * own).clamp_max(settings.smallest_share * own.mean())
+        return torch.maximum(own, least / settings.smallest_area)
 
     @cached_property
     def _angles(self) -> Tensor:

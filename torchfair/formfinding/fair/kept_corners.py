@@ -40,4 +40,5 @@ def held_corners(topology: Topology, corners: Tensor) -> list[int]:
     chosen = torch.zeros(topology.num_vertices, dtype=torch.long).index_fill(0, corners, 1)
     of_faces = torch.zeros(topology.num_faces, dtype=torch.long).index_add(0, faces, chosen[around])
     chosen[around[of_faces[faces] > _MOST_HELD]] = 0
-    return [int(vertex) for vertex in chosen.nonzero()]
+    held: list[int] = chosen.nonzero()[:, 0].tolist()
+    return held

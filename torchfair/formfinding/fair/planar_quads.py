@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from ...projection import Callback, Status
 from ...settings.fair_settings import FairSettings
 from ...topology import Topology
 from ..job import JobResult, Level
+from ..job.recipe import fixed_note
 from .kept_corners import corners_of_surface, held_corners
 from .panels import PLANAR_PROMISE
 from .planarity_goal import KEEP_LIMIT
@@ -46,7 +46,6 @@ _LEAST = 1.01  # E over C, beyond which they do
 _SOFTER = replace(PLANAR_QUADS, direction_weight=100.0)
 _LITTLE_SOFTER = replace(PLANAR_QUADS, direction_weight=200.0)
 _STAYS = 1e-9  # of an edge
-_FIXED = re.compile(r"\d+ vert(ices are|ex is) fixed")  # a note: these are corners
 _REMEDY = (
     "ask for more faces, which are more nearly planar before, or make a rough surface smooth first: torchfair denoise"
 )
@@ -69,14 +68,14 @@ def planar_quads(
     - where that keeps its promises but E ends above 1.01 C, and edges turned by at most half a degree. Directions count
       a third then, and what has less E is taken, if edges turn by at most 1 degree.
 
-    Corners of the boundary of the surface stay in their places, but for those of faces with three of them; all may move
-    where panels become planar only then, as where a rough boundary turns everywhere.
-
     There is none where the first is far from planar, by more than 0.1; and those for directions and E there are only
     if it took at most 250 steps.
 
     The result of a second solve is taken only where it keeps promises and limits as well as the first does; vertices
     may end as far from the surface as they were before.
+
+    Corners of the boundary of the surface stay in their places, but for those of faces with three of them; all may move
+    where panels become planar only then, as where a rough boundary turns everywhere.
 
     Args:
         mesh: from :func:`torchfair.meshing.principal_quads`.
@@ -122,27 +121,21 @@ def planar_quads(
         return job, {**measure_mesh_on(job.vertices, mesh), "before_planar": mesh.report}
 
     def best(held: Sequence[int]) -> _Solved:
-        job, report = solved(PLANAR_QUADS, held)
+        job, report = first = solved(PLANAR_QUADS, held)
         again = None if job.stopped else _again(report, holds=job.holds, steps=job.steps)
-        if again is not None:
-            settings, is_better = again
-            other = solved(settings, held)
-            if _is_as_good(other[0], job) and is_better(other[1], report):
-                return other
-            if other[0].stopped:
-                job = _stopped_like(other[0], job)
-        return job, report
+        if again is None:
+            return first
+        settings, is_better = again
+        other = solved(settings, held)
+        return _one_of(first, other, taken=_is_as_good(other[0], job) and is_better(other[1], report))
 
-    job, report = best(held)
+    job, report = first = best(held)
     if held and PLANAR_PROMISE < report["planarity_max"] <= _HOPELESS and not job.stopped:
-        other = best([])
-        if other[1]["planarity_max"] < report["planarity_max"]:
-            job, report = other
-        elif other[0].stopped:
-            job = _stopped_like(other[0], job)
+        freed = best([])
+        job, report = _one_of(first, freed, taken=freed[1]["planarity_max"] < report["planarity_max"])
     solve = f"{job.steps} steps towards planar polygons: {_ending(job)}"
     moved = (job.vertices - mesh.vertices).norm(dim=1)[corners.to(mesh.vertices.device)] / mesh.report["spacing"]
-    job = _in_counts(job)
+    job = _in_counts(job, fixed_note(len(held)))
     said = [*mesh.notes, *job.notes, *_turned(report), *_moved(moved), solve]
     return replace(mesh, vertices=job.vertices, report=report, notes=said), job
 
@@ -188,6 +181,14 @@ def _is_as_good(one: JobResult[Level], other: JobResult[Level]) -> bool:
     )
 
 
+def _one_of(first: _Solved, other: _Solved, *, taken: bool) -> _Solved:
+    """The other where it is taken; else the first, stopped if the other was."""
+    if taken:
+        return other
+    job, report = first
+    return (_stopped_like(other[0], job) if other[0].stopped else job), report
+
+
 def _stopped_like(stopped: JobResult[Level], job: JobResult[Level]) -> JobResult[Level]:
     """A job that is the best found when the one after it was stopped, so that who asked for that is told."""
     *levels, last = job.levels
@@ -206,12 +207,12 @@ def _moved(shares: Tensor) -> list[str]:
     ]
 
 
-def _in_counts(job: JobResult[Level]) -> JobResult[Level]:
-    """A job with what a mesh can be asked for in place of its settings, which are always the same."""
+def _in_counts(job: JobResult[Level], of_corners: str) -> JobResult[Level]:
+    """A job with what a mesh can be asked for in place of its settings, and without its note ``of_corners``."""
     *levels, last = job.levels
     promises = [replace(promise, remedy=_REMEDY) for promise in last.promises]
     known = {str(old): str(new) for old, new in zip(last.promises, promises, strict=True)}
-    notes = [known.get(note) or _without_limit(note) for note in job.notes if not _FIXED.fullmatch(note)]
+    notes = [known.get(note) or _without_limit(note) for note in job.notes if note != of_corners]
     return replace(job, levels=[*levels, replace(last, promises=promises)], notes=notes)
 
 

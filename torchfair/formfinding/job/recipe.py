@@ -176,7 +176,7 @@ class Recipe(ABC, Generic[S]):
             raise MeshError(f"vertices cannot be fixed and pulled at once: {both[:5]}")
         if chosen:
             self.pulls.hold(numbers)
-            self.notes.append(f"{len(numbers)} vertices are fixed" if len(numbers) > 1 else "1 vertex is fixed")
+            self.notes.append(fixed_note(len(numbers)))
 
     def pull(self, places: Mapping[int, Sequence[float]]) -> None:
         """Pulls vertices to places in the unit of the input.
@@ -260,3 +260,8 @@ def _with_unused_in_place(vertices: Tensor, topology: Topology) -> Tensor:
     """Vertices that no face uses put where one that is used stands, so that no size is measured by them."""
     unused = topology.valences == 0
     return torch.where(unused[:, None], vertices[topology.corners[:1]], vertices) if unused.any() else vertices
+
+
+def fixed_note(count: int) -> str:
+    """How a job says that so many vertices are fixed."""
+    return f"{count} vertices are fixed" if count > 1 else "1 vertex is fixed"
