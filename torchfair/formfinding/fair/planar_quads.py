@@ -132,7 +132,7 @@ def planar_quads(
     job, report = first = best(held)
     if held and PLANAR_PROMISE < report["planarity_max"] <= _HOPELESS and not job.stopped:
         freed = best([])
-        job, report = _one_of(first, freed, taken=freed[1]["planarity_max"] < report["planarity_max"])
+        job, report = _one_of(first, freed, taken=_is_planar(freed[1], report))
     solve = f"{job.steps} steps towards planar polygons: {_ending(job)}"
     moved = (job.vertices - mesh.vertices).norm(dim=1)[corners.to(mesh.vertices.device)] / mesh.report["spacing"]
     job = _in_counts(job, fixed_note(len(held)))
