@@ -67,6 +67,37 @@ def test_a_state_from_which_short_steps_are_refused_is_judged_once() -> None:
     assert moved.after(REFUSED, moved.standing, SETTINGS, inexact=False).suspicion is Status.STEP_TOLERANCE
 
 
+SHORT = replace(TAKEN, gain=0.45, size=1e-16, short=True)
+
+
+def after_steps(course: Course, *outcomes: Outcome, settings: ProjectionSettings = SETTINGS) -> Course:
+    """After steps that leave nothing but doubt."""
+    for outcome in outcomes:
+        course = course.after(outcome, course.standing, settings, inexact=False)
+        course = course.judged(certified=False, goes_on=True) if course.suspicion else course
+    return course
+
+
+def test_eight_idle_steps_in_a_row_are_the_end_if_it_is_no_minimum() -> None:
+    """Damping need not be exhausted: steps that gain less than half of what they promise leave it as it is."""
+    assert after_steps(start(), *[SHORT] * 7).status is None
+    assert after_steps(start(), *[SHORT] * 8).status is Status.STALLED
+    assert after_steps(start(), REFUSED, *[SHORT, REFUSED, REFUSED] * 2, SHORT).status is Status.STALLED
+    assert after_steps(start(), *[SHORT] * 7, TAKEN, *[SHORT] * 7).status is None
+    lower = Standing(start().merit * (1.0 - 1e-5), 0.5, 0.0)
+    fallen = after_steps(start(), *[SHORT] * 7).after(SHORT, lower, SETTINGS, inexact=False)
+    assert fallen.judged(certified=False, goes_on=True).status is None  # beside what is stiff they may be worth much
+    refused = replace(REFUSED, short=False)
+    assert after_steps(start(), *[SHORT] * 7, refused, *[SHORT] * 7).status is None
+    course = after_steps(start(), *[SHORT] * 7).after(SHORT, start().standing, SETTINGS, inexact=False)
+    assert course.judged(certified=True, goes_on=True).status is Status.STEP_TOLERANCE
+
+
+def test_where_every_step_is_taken_short_ones_are_no_end() -> None:
+    settings = replace(SETTINGS, step_policy="every")
+    assert after_steps(start(), *[SHORT] * 20, settings=settings).status is None
+
+
 @pytest.mark.parametrize("gain", [1.0, 1.5, 1e150])
 def test_damping_falls_to_a_third_however_much_a_step_gains(gain: float) -> None:
     assert Damping(6.0).accepted(gain).value == pytest.approx(2.0)

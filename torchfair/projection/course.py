@@ -9,6 +9,8 @@ from ..settings.projection_settings import ProjectionSettings
 from .damping import Damping
 from .result import Status
 
+_MOST_IDLE = 8  # steps; none of hundreds of runs went on to lower its merit by 1e-9 after five of them
+
 
 @dataclass(frozen=True)
 class Standing:
@@ -69,6 +71,7 @@ class Course:
         last: What became of the last step.
         suspicion: Status that the run ends with if a minimum is certified here.
         doubted: Whether this state was suspected before.
+        idle: How many of the last steps in a row were short and lowered the merit by less than its tolerance.
         status: Why the run ends, if it does.
     """
 
@@ -80,6 +83,7 @@ class Course:
     last: Outcome | None = None
     suspicion: Status | None = None
     doubted: bool = False
+    idle: int = 0
     status: Status | None = None
 
     @property
@@ -116,6 +120,7 @@ class Course:
                 outcome,
                 suspicion=Status.STEP_TOLERANCE if suspected else None,
                 doubted=self.doubted or suspected,
+                idle=self.idle + 1 if outcome.short else 0,
             )
         fall = (self.merit - standing.merit) / self.merit
         moved = Course(
@@ -127,6 +132,8 @@ class Course:
             outcome,
         )
         if outcome.short:
+            is_idle = fall < settings.merit_tolerance and not settings.takes_every_step
+            moved = replace(moved, idle=self.idle + 1 if is_idle else 0)
             return replace(moved, suspicion=Status.STEP_TOLERANCE)
         return moved._rested(outcome.damping.value, settings, inexact)
 
@@ -154,9 +161,10 @@ class Course:
 
         Args:
             certified: Whether this is a minimum.
-            goes_on: Whether the run goes on where it is none (unless no damping is left).
+            goes_on: Whether the run goes on where it is none (unless no damping is left, or steps have been idle).
         """
-        otherwise = Status.STALLED if self.damping.exhausted else None if goes_on else Status.SETTLED
+        is_stuck = self.damping.exhausted or self.idle >= _MOST_IDLE
+        otherwise = Status.STALLED if is_stuck else None if goes_on else Status.SETTLED
         status = self.suspicion if certified else otherwise
         return replace(self, suspicion=None, falls=self.falls if certified else (), status=status)
 
