@@ -15,17 +15,20 @@ from ._refreshed import refreshed
 
 
 class Part(IndexedModule):
-    """A term over one block, with its data as buffers and its stencil as indices."""
+    """A term over one block, with its data as buffers; its stencil and data without a fraction as indices."""
 
     element_weights: Tensor | None
 
     def __init__(self, term: ElementTerm) -> None:
-        super().__init__(*(index for _, index in term.stencil))
+        super().__init__(*(index for _, index in term.stencil), *filter(_is_index, term.data))
+        self._blocks, self._is_index = len(term.stencil), [_is_index(tensor) for tensor in term.data]
         self.block = term.stencil[0][0]
         self.refresh = term.refresh  # moves with this one where it is a module
         self._bare = replace(term, stencil=(), data=(), element_weights=None, refresh=None)
         self._names = _data_names(term, taken=set(dir(self)) | {"element_weights"})
         for name, tensor in zip([*self._names, "element_weights"], [*term.data, term.element_weights], strict=True):
+            if tensor is not None and _is_index(tensor):
+                continue
             if isinstance(tensor, nn.Parameter):
                 self.register_parameter(name, tensor)
             else:
@@ -34,13 +37,15 @@ class Part(IndexedModule):
     @property
     def data(self) -> list[Tensor]:
         """Data of the term, those that are not refreshed."""
-        return [getattr(self, name) for name in self._names]
+        whole = iter(self.indices[self._blocks :])
+        pairs = zip(self._names, self._is_index, strict=True)
+        return [next(whole) if is_index else getattr(self, name) for name, is_index in pairs]
 
     def term(self, weight: float) -> ElementTerm:
         """The term with the present data, and its weight times ``weight``."""
         return replace(
             self._bare,
-            stencil=[(self.block, index) for index in self.indices],
+            stencil=[(self.block, index) for index in self.indices[: self._blocks]],
             data=self.data,
             element_weights=self.element_weights,
             refresh=self.refresh,
@@ -55,7 +60,7 @@ class Part(IndexedModule):
             return values.expand(*batch, -1, -1), costs.expand(*batch, -1)
         members = vertices.reshape(-1, *vertices.shape[-2:])
         term = replace(self.term(1.0), element_weights=None)
-        local = [gather(members, index).flatten(0, 1) for index in self.indices]
+        local = [gather(members, index).flatten(0, 1) for index in self.indices[: self._blocks]]
         data = [tensor.to(vertices.dtype) if tensor.is_floating_point() else tensor for tensor in self._data(members)]
         first = term.values(tuple(argument.detach() for argument in (*local, *data)))
         spared = ~(torch.isfinite(term.missed(first)).all(1) & _are_below(torch.inf, local))
@@ -83,6 +88,11 @@ class Part(IndexedModule):
     def extra_repr(self) -> str:
         """Name and size of the term."""
         return f"{self._bare.name}: {self.indices[0].shape[0]} elements"
+
+
+def _is_index(data: Tensor) -> bool:
+    """Whether data are numbers without a fraction, or marks."""
+    return not (data.is_floating_point() or data.is_complex() or isinstance(data, nn.Parameter))
 
 
 def _are_below(most: float, local: list[Tensor]) -> Tensor:

@@ -39,7 +39,8 @@ class Constraint(nn.Module):
 
     Data and element weights are buffers, ``parts.0.targets`` and so on, named as the residual names them: they follow
     ``.to()``, are in the ``state_dict``, and can be replaced by ``torch.func.functional_call``. Parameters among them
-    stay parameters, so data can be learned; gradients flow to data that require them.
+    stay parameters, so data can be learned; gradients flow to data that require them. Data without a fraction, indices
+    and marks, are none, as stencils are none: they follow to a device.
 
     Args:
         terms: Over one block, which may have any name; none at all is legal and costs nothing.

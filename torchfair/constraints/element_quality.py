@@ -11,6 +11,7 @@ from ..geometry._ops import angle_of
 from ..projection import ElementTerm
 from ..topology import Topology
 from ._components import area_derivatives, area_vectors, components_first, cross, derivative_rows, dot, lengths
+from ._pooled import pooled_faces
 from .barrier import barrier, barrier_slope
 from .base import Constraint
 
@@ -93,15 +94,15 @@ def face_area_terms(
     return [
         ElementTerm(
             "face areas",
-            share,
-            [(block, corners)],
-            data=(areas[numbers],),
+            group.function(share),
+            [(block, group.stencil)],
+            data=(areas[group.numbers], *group.data),
             weight=weight,
-            jacobian=slope,
+            jacobian=group.jacobian(slope),
             silent=True,
             batched=True,
         )
-        for numbers, corners in topology.faces_by_size.values()
+        for group in pooled_faces(topology)
     ]
 
 

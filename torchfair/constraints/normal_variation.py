@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import torch
 from torch import Tensor
 
@@ -9,6 +11,7 @@ from ..projection import ElementTerm, SmoothAbsolute
 from ..topology import Topology
 from ._components import components_first, cross, derivative_rows, dot
 from ._polygon_bend import PolygonBend, polygon_bend
+from ._pooled import pooled
 from .base import Constraint
 
 NAME = "normal variation"
@@ -23,26 +26,34 @@ def normal_variation_terms(
     smoothly through flat edges.
 
     Args:
-        topology: Any polygon mesh; edges are grouped by the sizes of their two faces.
+        topology: Any polygon mesh; edges are grouped by the sizes of their two faces, if many have them.
         smoothing: Length below which ``l l*`` counts as flat, in the unit of the vertices.
         weight: Of E, which counts once; dimensionless.
         block: Name of the vertex block.
     """
     terms = []
-    for (left, _), stencil in edge_stencils(topology).items():
-        bend = pair_bend(left, stencil.shape[1])
+    for group in pooled(_edges_by_sizes(topology)):
+        bend = pair_bend(sum(group.runs[:2]), sum(group.runs))
         terms.append(
             ElementTerm(
                 NAME,
-                bend.residual,
-                [(block, stencil)],
+                group.function(bend.residual),
+                [(block, group.stencil)],
+                data=group.data,
                 weight=weight,
                 loss=SmoothAbsolute(smoothing),
-                jacobian=bend.jacobian,
+                jacobian=group.jacobian(bend.jacobian),
                 batched=True,
             )
         )
     return terms
+
+
+def _edges_by_sizes(topology: Topology) -> Iterator[tuple[Tensor, list[Tensor]]]:
+    """Stencils of :func:`edge_stencils`, with their numbers: the edge, and the other corners of each face."""
+    for (left, right), stencil in edge_stencils(topology).items():
+        runs = torch.split(stencil, [2, left - 2, right - 2], dim=1)
+        yield torch.arange(len(stencil), device=stencil.device), list(runs)
 
 
 class SmoothNormalVariation(Constraint):

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from ...constraints._components import area_derivatives, area_vectors, components_first, derivative_rows, lengths
+from ...constraints._pooled import pooled_faces
 from ...constraints.barrier import barrier, barrier_slope
 from ...geometry import face_areas
 from ...projection import ElementTerm
@@ -31,15 +32,15 @@ def growth_terms(topology: Topology, most: Tensor, *, weight: float) -> list[Ele
     return [
         ElementTerm(
             "panel sizes",
-            _barriers,
-            [("vertices", corners)],
-            data=(most[numbers],),
+            group.function(_barriers),
+            [("vertices", group.stencil)],
+            data=(most[group.numbers], *group.data),
             weight=weight,
-            jacobian=_slopes,
+            jacobian=group.jacobian(_slopes),
             silent=True,
             batched=True,
         )
-        for numbers, corners in topology.faces_by_size.values()
+        for group in pooled_faces(topology)
     ]
 
 
