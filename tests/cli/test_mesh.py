@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import torch
@@ -14,7 +12,7 @@ from helpers import report_in
 from PIL import Image
 
 from torchfair.cli import main
-from torchfair.cli.mesh import fill, options, too_short
+from torchfair.cli.mesh import fill, options, too_small
 from torchfair.cli.parser import CommandParser
 from torchfair.io import load_edge_labels, load_mesh, save_mesh
 from torchfair.meshing import MeshingSettings, principal_quads
@@ -93,13 +91,16 @@ def test_planar_quads(tmp_path: Path) -> None:
     assert report["not_reached"] == []
 
 
-def test_edges_that_are_nearly_collapsed_are_a_promise_missed() -> None:
-    def made(shortest: float) -> Any:
-        return SimpleNamespace(report={"shortest_edge": shortest})
+def test_edges_that_are_nearly_collapsed_and_slivers_at_curves_are_promises_missed() -> None:
+    def missed(shortest: float = 1.0, smallest: float | None = 1.0, **others: float) -> list[str]:
+        return too_small({"shortest_edge": shortest, "smallest_curve_face": smallest, **others})
 
-    assert too_short(made(0.02)) == []
-    (missed,) = too_short(made(0.0199))
-    assert missed.startswith("shortest edge 0.0199 mean edges, at least 0.02 asked for: NOT REACHED")
+    assert missed(0.02, 0.05) == missed(smallest=None) == missed(smallest=0.01, spacing_shortest=0.1) == []
+    (edge,) = missed(0.0199)
+    assert edge.startswith("shortest edge 0.0199 mean edges, at least 0.02 asked for: NOT REACHED")
+    (face,) = missed(smallest=0.049)
+    assert face.startswith("smallest face at the boundary and creases 0.049 of the mean, at least 0.05 asked for: NOT")
+    assert face.endswith("ask for more faces, or raise --corner-angle")
 
 
 def test_ctrl_c_keeps_the_best_mesh(

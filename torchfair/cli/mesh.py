@@ -40,6 +40,7 @@ _DESCRIPTION = (
     "nothing is written."
 )
 _SHORTEST = 0.02  # edge of a mesh, in mean edges
+_SMALLEST = 0.05  # face at curves, over the mean
 _ROWS = {
     "faces": "faces",
     "quads": "  quads among them",
@@ -53,6 +54,7 @@ _ROWS = {
     "distance_max": "largest distance from the surface, in mean edges",
     "shortest_edge": "shortest edge, in mean edges",
     "smallest_angle_degrees": "smallest angle of a corner, degrees",
+    "smallest_curve_face": "smallest face at the boundary and creases, over the mean",
     "spacing_shortest": "shortest spacing asked for",
     "spacing_longest": "longest ...",
     "range_share": "share of the surface at the ends of the range",
@@ -120,7 +122,7 @@ def run(arguments: argparse.Namespace) -> int:
     with deferred_interrupts() as interrupts:
         if arguments.planar:
             made, not_planar, status = made_planar(made, surface, quiet=getattr(arguments, "quiet", False))
-        missed = [*not_planar, *too_short(made)]
+        missed = [*not_planar, *too_small(made.report)]
         report = _report(arguments, made, settings, missed, time.perf_counter() - began) | read_report(surface)
         outputs.save(request, made, lambda: report)
         request.interrupted = interrupts.pending
@@ -138,14 +140,17 @@ def _made(surface: PolygonMesh, arguments: argparse.Namespace, settings: Meshing
     return principal_quads(surface.vertices, surface.topology, count=arguments.quads, settings=settings)
 
 
-def too_short(made: Made) -> list[str]:
-    """The promise of the shortest edge, where it is not kept."""
+def too_small(report: Mapping[str, Any]) -> list[str]:
+    """The promises of the shortest edge and of faces at curves where sizes are equal, as far as they are not kept."""
     from ..formfinding import Promise
 
     remedy = "corners of the boundary or of creases that close stay: ask for more faces, or raise --corner-angle"
-    reached = made.report["shortest_edge"]
-    promise = Promise("shortest edge", _SHORTEST, reached, "at least", "mean edges", remedy=remedy)
-    return [] if promise.holds else [str(promise)]
+    reached, smallest = report["shortest_edge"], report["smallest_curve_face"]
+    promises = [Promise("shortest edge", _SHORTEST, reached, "at least", "mean edges", remedy=remedy)]
+    if smallest is not None and "spacing_shortest" not in report:
+        name = "smallest face at the boundary and creases"
+        promises.append(Promise(name, _SMALLEST, smallest, "at least", "of the mean", remedy=remedy))
+    return [str(promise) for promise in promises if not promise.holds]
 
 
 class MeshOutputs(Outputs):

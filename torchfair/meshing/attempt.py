@@ -27,7 +27,8 @@ from .plan import Plan
 from .seams import find_seams
 from .sound_map import sound_map
 from .surface import DesignSurface
-from .tracing import Cells, trace_cells
+from .thin_triangles import rows_of, without_thin_triangles
+from .tracing import trace_cells
 from .verification import shape_of, verified_topology, verify_corners, verify_creases
 
 _SHORTEST_RUN = 1.5  # spacings
@@ -58,31 +59,24 @@ def attempt(
         near = spacings[KDTree(frames.centres).query(cells.positions)[1]] if surface.sizes else spacings[:1]
         most = math.inf if lattice.has_rows else _MOST_TURN
         whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1), most))
-        faces, size, shape = whole.faces, len(whole.positions), shape_of(surface.topology)
-        verify_creases(verified_topology(faces, size, shape), whole.creases, creases)
-        rows = _rows(cells, whole)
+        _verify(whole, surface, creases)
         if lattice.has_rows:
-            faces = cut_cells(whole.positions, faces, rows)
-            verified_topology(faces, size, shape)
-        verify_corners(whole.positions, faces)
+            triangles = cut_cells(whole.positions, whole.faces, rows_of(cells, whole))
+            whole = without_thin_triangles(cells, whole._replace(faces=triangles))
+        _verify(whole, surface, creases)
+        verify_corners(whole.positions, whole.faces)
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None
     singular = np.flatnonzero(graph.charges)
     places, charges = frames.points[singular], graph.charges[singular]
     sharp = frames.points[frames.edges[creases.edges]]
-    return PieceMesh(whole.positions, faces, rows, whole.creases, sharp, places, charges)
+    return PieceMesh(whole.positions, whole.faces, rows_of(cells, whole), whole.creases, sharp, places, charges)
 
 
-def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
-    """Pairs of nodes that are ends of an edge on a line with the second coordinate constant."""
-    pairs = [
-        (face[side], face[(side + 1) % len(face)])
-        for face, on in zip(cells.faces, cells.coordinates, strict=True)
-        for side in range(len(face))
-        if on[side] == 1
-    ]
-    numbered = np.sort(whole.number[np.array(pairs, np.int64).reshape(-1, 2)], axis=1)
-    return {(int(a), int(b)) for a, b in numbered if 0 <= a < b}
+def _verify(whole: Compact, surface: DesignSurface, creases: Creases) -> None:
+    """Raises MeshError if polygons have another topology than the surface, or other creases."""
+    made = verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
+    verify_creases(made, whole.creases, creases)
 
 
 def _spacings(surface: DesignSurface, graph: CutGraph, plan: Plan) -> Floats:

@@ -58,7 +58,8 @@ def principal_quads(
         the smooth surface through the vertices, with ``l l*`` of creases) and their ratio
         ``variation_over_curvature`` (None for flat surfaces), ``distance_max`` of the middles of edges and
         faces from the surface in mean edges, ``shortest_edge`` in mean edges, ``smallest_angle_degrees`` at
-        corners, ``singular`` points by index, ``total_index``, and sizes.
+        corners, ``smallest_curve_face``, the area of the smallest face at the boundary and at creases over the mean
+        (None if there are none), ``singular`` points by index, ``total_index``, and sizes.
         Adaptive meshes have ``spacing_shortest`` and ``spacing_longest``, as asked for, and ``range_share``, the share
         of the area where curvature asks for a length out of the range.
 

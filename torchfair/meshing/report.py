@@ -11,7 +11,7 @@ from torch import Tensor
 
 from .._one_mesh import one_mesh
 from ..energies import NormalVariation
-from ..geometry import corner_angles, edge_lengths, face_centres, planarity
+from ..geometry import corner_angles, edge_lengths, face_areas, face_centres, planarity
 from ..topology import Topology
 from .components import ReadSurface
 from .curvature_sizes import ASKED
@@ -66,6 +66,7 @@ def measure(
         "distance_max": float(reference.closest(middles).distances.max()) / mean_edge,
         "shortest_edge": float(lengths.min()) / mean_edge,
         "smallest_angle_degrees": math.degrees(float(corner_angles(vertices, topology).min())),
+        "smallest_curve_face": _smallest_at_curves(vertices, topology, creases),
         "crease_edges": len(creases.edges),
         "crease_distance_max": creases.distance(vertices) / mean_edge,
         "mean_edge": mean_edge,
@@ -76,6 +77,14 @@ def measure(
         "boundary_loops": shape.boundary_loops,
         "components": shape.components,
     }
+
+
+def _smallest_at_curves(vertices: Tensor, topology: Topology, creases: MeshCreases) -> float | None:
+    """Area of the smallest face with a vertex on the boundary or a crease, over the mean of all; None without any."""
+    on_curve = topology.is_boundary_vertex.clone()
+    on_curve[creases.edges.flatten()] = True
+    areas, faces = face_areas(vertices, topology), topology.corner_faces[on_curve[topology.corners]]
+    return float(areas[faces].min() / areas.mean()) if len(faces) else None
 
 
 def _counts(indices: Tensor) -> dict[str, int]:
