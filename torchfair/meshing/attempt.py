@@ -25,6 +25,7 @@ from .off_lines import off_the_lines
 from .piece_mesh import PieceMesh
 from .plan import Plan
 from .seams import find_seams
+from .slit_faces import without_slits
 from .sound_map import sound_map
 from .surface import DesignSurface
 from .thin_triangles import rows_of, without_thin_triangles
@@ -63,6 +64,8 @@ def attempt(
         if lattice.has_rows:
             triangles = cut_cells(whole.positions, whole.faces, rows_of(cells, whole))
             whole = without_thin_triangles(cells, whole._replace(faces=triangles))
+        else:
+            whole = whole._replace(faces=without_slits(whole.positions, whole.faces))
         _verify(whole, surface, creases)
         verify_corners(whole.positions, whole.faces)
     except MeshError as error:
