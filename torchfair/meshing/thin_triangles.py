@@ -27,16 +27,18 @@ def without_thin_triangles(cells: Cells, whole: Compact) -> Compact:
         cells: of a map.
         whole: the triangles.
     """
-    on_boundary, fixed = (_marked(whole, marks) for marks in (cells.on_boundary, cells.fixed))
     for _ in range(_ROUNDS):
-        flipped = _flipped(whole, rows_of(cells, whole), on_boundary)
-        edits = PolygonEdits(whole.positions, flipped, on_boundary, fixed, whole.creases)
-        if not _collapse_small(edits):
-            return whole._replace(faces=flipped)
-        fewer = compact(edits)
-        number = np.where(whole.number >= 0, fewer.number[whole.number], -1)
-        whole = fewer._replace(number=number)
         on_boundary, fixed = (_marked(whole, marks) for marks in (cells.on_boundary, cells.fixed))
+        on_curve = on_boundary.copy()
+        on_curve[whole.creases] = True
+        if not _small(whole.positions, whole.faces, on_curve):
+            break
+        whole = whole._replace(faces=_flipped(whole, rows_of(cells, whole), on_curve))
+        edits = PolygonEdits(whole.positions, whole.faces, on_boundary, fixed, whole.creases)
+        if not _collapsed(edits, _small(whole.positions, whole.faces, on_curve)):
+            break
+        fewer = compact(edits)
+        whole = fewer._replace(number=np.where(whole.number >= 0, fewer.number[whole.number], -1))
     return whole
 
 
@@ -59,28 +61,31 @@ def _marked(whole: Compact, marks: Bools) -> Bools:
     return marked
 
 
-def _collapse_small(edits: PolygonEdits) -> int:
-    """Collapses one of the two shorter sides of small triangles at curves, the smallest triangle first."""
-    least = _SMALL * float(np.mean([edits.area(number) for number in edits.faces]))
-    done = 0
-    for number in sorted(edits.curve_faces(), key=edits.area):
-        if number in edits.faces and edits.area(number) < least:
+def _small(positions: Floats, triangles: list[list[int]], on_curve: Bools) -> list[int]:
+    """Numbers of small triangles with a vertex on a curve, the smallest first."""
+    areas = np.linalg.norm(area_vectors(positions, triangles), axis=1)
+    small = np.flatnonzero((areas < _SMALL * areas.mean()) & on_curve[np.array(triangles)].any(1))
+    found: list[int] = small[np.argsort(areas[small], kind="stable")].tolist()
+    return found
+
+
+def _collapsed(edits: PolygonEdits, small: list[int]) -> int:
+    """How many of some triangles lost one of their two shorter sides; others that this changes wait."""
+    before, done = {number: list(edits.faces[number]) for number in small}, 0
+    for number in small:
+        if edits.faces.get(number) == before[number]:
             done += any(edits.collapse(edge) for edge in sorted(edits.sides(number), key=edits.length)[:2])
     return done
 
 
-def _flipped(whole: Compact, rows: set[Pair], on_boundary: Bools) -> list[list[int]]:
-    """The triangles after flips beside small ones, the smallest first."""
-    found, positions = [list(triangle) for triangle in whole.faces], whole.positions
+def _flipped(whole: Compact, rows: set[Pair], on_curve: Bools) -> list[list[int]]:
+    """The triangles after flips beside small ones."""
+    found = [list(triangle) for triangle in whole.faces]
     owners = {(face[k - 1], face[k]): number for number, face in enumerate(found) for k in range(3)}
     kept = rows | {(int(a), int(b)) for a, b in whole.creases}
-    on_curve = on_boundary.copy()
-    on_curve[whole.creases] = True
     for _ in range(_ROUNDS):
-        areas = np.linalg.norm(area_vectors(positions, found), axis=1)
-        small = np.flatnonzero((areas < _SMALL * areas.mean()) & on_curve[np.array(found)].any(1))
-        order = small[np.argsort(areas[small], kind="stable")].tolist()
-        if not sum(_flip_one(positions, found, owners, kept, number) for number in order):
+        small = _small(whole.positions, found, on_curve)
+        if not sum(_flip_one(whole.positions, found, owners, kept, number) for number in small):
             break
     return found
 
