@@ -82,6 +82,25 @@ def test_creases_of_the_surface_are_edges_of_the_mesh(name: str) -> None:
     assert found.topology.is_quadrangular == (name not in NOT_ALL_LINES)
 
 
+def smallest_at(mesh: QuadMesh, curves: set[int]) -> float:
+    """Area over the mean of the smallest face with one of some vertices."""
+    areas = face_areas(mesh.vertices, mesh.topology)
+    touching = [not curves.isdisjoint(face) for face in mesh.topology.face_lists()]
+    return float(areas[torch.tensor(touching)].min() / areas.mean())
+
+
+def test_the_smallest_face_at_curves_is_one_at_creases_or_at_the_boundary() -> None:
+    solid = principal_quads(*SHAPES["pyramid"], count=60)
+    on_creases = set(solid.creases.edges.flatten().tolist())
+    assert solid.report["smallest_curve_face"] == pytest.approx(smallest_at(solid, on_creases))
+    sheet = principal_quads(*SHAPES["folded sheet"], count=60)
+    on_both = set(sheet.creases.edges.flatten().tolist())
+    on_both |= set(torch.nonzero(sheet.topology.is_boundary_vertex).flatten().tolist())
+    assert sheet.report["smallest_curve_face"] == pytest.approx(smallest_at(sheet, on_both))
+    ring = irregular(Torus(), 600)
+    assert principal_quads(*ring, count=150).report["smallest_curve_face"] is None
+
+
 def test_a_box_has_its_corners_and_edges_wherever_it_is() -> None:
     vertices, topology = box()
     turned = vertices @ random_rotation(3).T * 1e3 + 500

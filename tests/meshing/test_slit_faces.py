@@ -10,6 +10,7 @@ from torchfair import Topology
 from torchfair.geometry import corner_angles
 from torchfair.meshing import principal_quads
 from torchfair.meshing.polygon_area import area_vector
+from torchfair.meshing.polygon_sides import sides_cross
 from torchfair.meshing.slit_faces import without_slits
 
 
@@ -38,6 +39,23 @@ def test_other_faces_stay_as_they_are() -> None:
     wide = np.tan(np.radians(5.1)) * 0.5
     for faces in ([[0, 1, 5, 6]], [list(range(7))]):
         assert without_slits(notched(wide), faces) is faces
+
+
+def test_no_part_has_an_angle_below_eight_degrees() -> None:
+    """In a face so low that every cut from the tip is nearly along the slit."""
+    for height, parts in ((0.06, 1), (0.6, 2)):
+        low = notched(1e-5) * [1, 1, 1]
+        low[:, 1] = 0.5 + height * (low[:, 1] - 0.5)
+        assert len(without_slits(low, [list(range(7))])) == parts
+
+
+def test_no_part_has_sides_that_cross() -> None:
+    """Between the tip and the left side there is a notch from above; a cut to the corner behind it would cross that."""
+    notch = [[0.4, 1, 0], [0.3, 0.35, 0], [0.2, 1, 0]]
+    positions = np.vstack([notched(1e-5)[:6], notch, [[0, 1, 0]]])
+    parts = without_slits(positions, [list(range(10))])
+    assert len(parts) == 2
+    assert not any(sides_cross(positions[part], np.array([0.0, 0, 1])) for part in parts)
 
 
 def test_no_edge_is_made_twice() -> None:

@@ -59,8 +59,33 @@ def test_corners_stay_even_if_a_thin_triangle_does() -> None:
     assert found.number.tolist() == [0, 1, 2, 3]
 
 
+def test_no_edge_is_made_twice_by_a_flip() -> None:
+    """Another pair of triangles, below, has the edge that the flip would make."""
+    positions = np.vstack([KITE, [[0.6, -1, 0.5], [0.4, -1, -0.5]]])
+    faces = [[0, 1, 2], [0, 2, 3], [1, 3, 4], [3, 1, 5]]
+    on = [[0, 0, 0]] * 4
+    none, every = np.zeros((0, 2), np.int64), np.ones(6, bool)
+    cells = Cells(positions, faces, on, every, every, none)
+    assert without_thin_triangles(cells, Compact(positions, faces, np.arange(6), none)).faces == faces
+
+
+def test_the_flip_that_leaves_the_smaller_triangle_largest_is_made() -> None:
+    """Both sides of the thin triangle 0 1 2 may be flipped: beyond 0 2 lies 3, beyond 1 2 lies 4."""
+    positions = np.array([[0, 0, 0], [1, 0, 0], [1.2, 0.015, 0], [0.3, 1, 0], [4, 0.027, 0]], float)
+    for turn in range(3):
+        thin = np.roll([0, 1, 2], turn).tolist()
+        faces = [thin, [0, 2, 3], [2, 1, 4]]
+        none, every = np.zeros((0, 2), np.int64), np.ones(5, bool)
+        cells = Cells(positions, faces, [[0, 0, 0]] * 3, every, every, none)
+        found = without_thin_triangles(cells, Compact(positions, faces, np.arange(5), none)).faces
+        assert frozenset({0, 1, 3}) in sets(found)
+        assert frozenset({1, 2, 3}) in sets(found)
+
+
 def test_only_triangles_at_curves_are_looked_at() -> None:
+    """Creases are some."""
     assert thinned(boundary=False).faces == [[0, 1, 2], [0, 2, 3]]
+    assert len(thinned(boundary=False, crease=True).faces) == 1
 
 
 def test_rows_are_sides_of_cells_on_lines_of_the_second_coordinate() -> None:
