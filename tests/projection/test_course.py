@@ -93,6 +93,13 @@ def test_eight_idle_steps_in_a_row_are_the_end_if_it_is_no_minimum() -> None:
     assert course.judged(certified=True, goes_on=True).status is Status.STEP_TOLERANCE
 
 
+def test_idle_steps_are_no_end_while_the_damping_falls() -> None:
+    """From far too much of it the first steps are short and lower nothing."""
+    falling = [replace(SHORT, damping=Damping(1e9 / 3.0**number)) for number in range(20)]
+    assert after_steps(start(), *falling).status is None
+    assert after_steps(start(), *falling[::-1]).status is Status.STALLED
+
+
 def test_where_every_step_is_taken_short_ones_are_no_end() -> None:
     settings = replace(SETTINGS, step_policy="every")
     assert after_steps(start(), *[SHORT] * 20, settings=settings).status is None

@@ -71,7 +71,7 @@ class Course:
         last: What became of the last step.
         suspicion: Status that the run ends with if a minimum is certified here.
         doubted: Whether this state was suspected before.
-        idle: How many of the last steps in a row were short and lowered the merit by less than its tolerance.
+        idle: Damping of the last steps, as far back as all were short and lowered the merit by less than its tolerance.
         status: Why the run ends, if it does.
     """
 
@@ -83,7 +83,7 @@ class Course:
     last: Outcome | None = None
     suspicion: Status | None = None
     doubted: bool = False
-    idle: int = 0
+    idle: tuple[float, ...] = ()
     status: Status | None = None
 
     @property
@@ -120,7 +120,7 @@ class Course:
                 outcome,
                 suspicion=Status.STEP_TOLERANCE if suspected else None,
                 doubted=self.doubted or suspected,
-                idle=self.idle + 1 if outcome.short else 0,
+                idle=self._idle_after(outcome) if outcome.short else (),
             )
         fall = (self.merit - standing.merit) / self.merit
         moved = Course(
@@ -133,9 +133,11 @@ class Course:
         )
         if outcome.short:
             is_idle = fall < settings.merit_tolerance and not settings.takes_every_step
-            moved = replace(moved, idle=self.idle + 1 if is_idle else 0)
-            return replace(moved, suspicion=Status.STEP_TOLERANCE)
+            return replace(moved, idle=self._idle_after(outcome) if is_idle else (), suspicion=Status.STEP_TOLERANCE)
         return moved._rested(outcome.damping.value, settings, inexact)
+
+    def _idle_after(self, outcome: Outcome) -> tuple[float, ...]:
+        return (*self.idle, outcome.damping.value)[-_MOST_IDLE:]
 
     def _rested(self, damping: float, settings: ProjectionSettings, inexact: bool) -> Course:
         """Whether the merit has come to rest; if so, with an iterative linear solver also when that is tightened.
@@ -161,9 +163,11 @@ class Course:
 
         Args:
             certified: Whether this is a minimum.
-            goes_on: Whether the run goes on where it is none (unless no damping is left, or steps have been idle).
+            goes_on: Whether the run goes on where it is none (unless no damping is left, or the last steps have been
+                idle, and the damping that kept them short has not fallen meanwhile).
         """
-        is_stuck = self.damping.exhausted or self.idle >= _MOST_IDLE
+        idle = len(self.idle) == _MOST_IDLE and self.idle[-1] >= self.idle[0]
+        is_stuck = self.damping.exhausted or idle
         otherwise = Status.STALLED if is_stuck else None if goes_on else Status.SETTLED
         status = self.suspicion if certified else otherwise
         return replace(self, suspicion=None, falls=self.falls if certified else (), status=status)
