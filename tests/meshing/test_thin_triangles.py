@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -10,26 +12,33 @@ from torchfair import Topology
 from torchfair.boundary import boundary_corners
 from torchfair.geometry import face_areas
 from torchfair.meshing import MeshingSettings, principal_triangles
-from torchfair.meshing.boundary_cells import Compact
-from torchfair.meshing.thin_triangles import rows_of, without_thin_triangles
-from torchfair.meshing.tracing import Cells
+from torchfair.meshing.components import Pieces
+from torchfair.meshing.mesh_creases import MeshCreases
+from torchfair.meshing.thin_triangles import thickened
 from torchfair.shapes import PrincipalParaboloid, irregular_triangles
 
 KITE = np.array([[0, 0, 0], [0.5, -0.02, 0], [1, 0, 0], [0.5, 1, 0]], float)
 """With 1 nearly on the side 0 2 of the triangle 0 2 3."""
 
 
-def thinned(
-    *, row: bool = False, crease: bool = False, fixed: tuple[int, ...] = (0, 2, 3), boundary: bool = True
-) -> Compact:
+def pieces(
+    positions: np.ndarray,
+    faces: list[list[int]],
+    rows: set[tuple[int, int]] | None = None,
+    creases: list[list[int]] | None = None,
+) -> Pieces:
+    """Triangles as one component."""
+    lines = MeshCreases(torch.tensor(creases or []).long().view(-1, 2), torch.zeros(0, 2, 3, dtype=torch.float64))
+    none = torch.zeros(0, dtype=torch.float64)
+    return Pieces(positions, faces, rows or set(), lines, none.view(0, 3), none, [], [0], [len(positions)], None)
+
+
+def thinned(*, row: bool = False, crease: bool = False, fixed: tuple[int, ...] = (0, 2, 3)) -> Pieces:
     """What becomes of the two triangles of the kite."""
-    faces, on = [[0, 1, 2], [0, 2, 3]], [[2, 2, int(row)], [int(row), 2, 2]]
-    marks = np.zeros(4, bool)
-    marks[list(fixed)] = True
-    creases = np.array([[0, 2]] if crease else [], np.int64).reshape(-1, 2)
-    on_boundary = np.full(4, boundary)
-    cells = Cells(KITE, faces, on, on_boundary, marks, creases)
-    return without_thin_triangles(cells, Compact(KITE, faces, np.arange(4), creases))
+    kept = np.zeros(4, bool)
+    kept[list(fixed)] = True
+    kite = pieces(KITE, [[0, 1, 2], [0, 2, 3]], {(0, 2)} if row else None, [[0, 2]] if crease else None)
+    return thickened(kite, kept)
 
 
 def sets(faces: list[list[int]]) -> set[frozenset[int]]:
@@ -48,52 +57,66 @@ def test_the_side_of_a_thin_triangle_is_flipped() -> None:
 @pytest.mark.parametrize("kept", ["row", "crease"])
 def test_an_edge_that_has_to_stay_is_not_flipped_and_the_triangle_collapses(kept: str) -> None:
     found = thinned(**{kept: True})  # type: ignore[arg-type]
-    assert len(found.positions) == 3
-    assert found.number[1] in (found.number[0], found.number[2])
-    assert sets(found.faces) == {frozenset(found.number[[0, 2, 3]].tolist())}
+    assert found.counts == [3]
+    np.testing.assert_array_equal(found.positions, KITE[[0, 2, 3]])
+    assert sets(found.faces) == {frozenset({0, 1, 2})}
+    assert found.rows == ({(0, 1)} if kept == "row" else set())
+    assert found.creases.edges.tolist() == ([[0, 1]] if kept == "crease" else [])
 
 
 def test_corners_stay_even_if_a_thin_triangle_does() -> None:
     found = thinned(row=True, fixed=(0, 1, 2, 3))
     assert found.faces == [[0, 1, 2], [0, 2, 3]]
-    assert found.number.tolist() == [0, 1, 2, 3]
+    np.testing.assert_array_equal(found.positions, KITE)
 
 
 def test_no_edge_is_made_twice_by_a_flip() -> None:
-    """Another pair of triangles, below, has the edge that the flip would make."""
-    positions = np.vstack([KITE, [[0.6, -1, 0.5], [0.4, -1, -0.5]]])
-    faces = [[0, 1, 2], [0, 2, 3], [1, 3, 4], [3, 1, 5]]
-    on = [[0, 0, 0]] * 4
-    none, every = np.zeros((0, 2), np.int64), np.ones(6, bool)
-    cells = Cells(positions, faces, on, every, every, none)
-    assert without_thin_triangles(cells, Compact(positions, faces, np.arange(6), none)).faces == faces
+    """A third triangle has the edge that the flip would make."""
+    faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1]]
+    assert thickened(pieces(KITE, faces), np.ones(4, bool)).faces == faces
 
 
 def test_the_flip_that_leaves_the_smaller_triangle_largest_is_made() -> None:
     """Both sides of the thin triangle 0 1 2 may be flipped: beyond 0 2 lies 3, beyond 1 2 lies 4."""
-    positions = np.array([[0, 0, 0], [1, 0, 0], [1.2, 0.015, 0], [0.3, 1, 0], [4, 0.027, 0]], float)
+    positions = np.array([[0, 0, 0], [1, 0, 0], [1.2, 0.015, 0], [0.3, 1, 0], [4, 0.027, 0]])
     for turn in range(3):
         thin = np.roll([0, 1, 2], turn).tolist()
-        faces = [thin, [0, 2, 3], [2, 1, 4]]
-        none, every = np.zeros((0, 2), np.int64), np.ones(5, bool)
-        cells = Cells(positions, faces, [[0, 0, 0]] * 3, every, every, none)
-        found = without_thin_triangles(cells, Compact(positions, faces, np.arange(5), none)).faces
-        assert frozenset({0, 1, 3}) in sets(found)
-        assert frozenset({1, 2, 3}) in sets(found)
+        found = sets(thickened(pieces(positions, [thin, [0, 2, 3], [2, 1, 4]]), np.ones(5, bool)).faces)
+        assert frozenset({0, 1, 3}) in found
+        assert frozenset({1, 2, 3}) in found
 
 
 def test_only_triangles_at_curves_are_looked_at() -> None:
-    """Creases are some."""
-    assert thinned(boundary=False).faces == [[0, 1, 2], [0, 2, 3]]
-    assert len(thinned(boundary=False, crease=True).faces) == 1
+    """Around a thin pair inside a hexagon of triangles nothing changes; with a crease on it something does."""
+    around = [[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi / 3]
+    outer = [[2 * x, 2 * y, 0.0] for x, y, _ in around]
+    positions = np.array([*around, *outer, [0.0, 0.02, 0], [0.05, -0.02, 0]])
+    inside = [[0, 1, 12], [1, 2, 12], [2, 3, 12], [3, 4, 12], [4, 13, 12], [4, 5, 13], [5, 0, 13], [0, 12, 13]]
+    ring = [of for k in range(6) for of in ([k, 6 + k, 6 + (k + 1) % 6], [k, 6 + (k + 1) % 6, (k + 1) % 6])]
+    fixed = np.arange(14) < 12
+    assert thickened(found := pieces(positions, [*inside, *ring]), fixed) is found
+    creased = pieces(positions, [*inside, *ring], creases=[[3, 12], [0, 12]])
+    assert len(thickened(creased, fixed | (np.arange(14) == 12)).positions) == 13
 
 
-def test_rows_are_sides_of_cells_on_lines_of_the_second_coordinate() -> None:
-    """By the vertices that nodes have become, without those that are gone."""
-    none, no = np.zeros((0, 2), np.int64), np.zeros(4, bool)
-    cells = Cells(KITE, [[0, 1, 2], [0, 2, 3]], [[1, 0, 1], [1, 2, 1]], ~no, no, none)
-    whole = Compact(KITE, [], np.array([0, 0, 1, -1]), none)
-    assert rows_of(cells, whole) == {(0, 1)}
+def test_components_keep_their_vertices() -> None:
+    """Two kites of which one loses a vertex."""
+    both = replace(
+        pieces(np.vstack([KITE, KITE + 5]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]], {(4, 6)}), counts=[4, 4]
+    )
+    found = thickened(both, np.arange(8) % 4 != 1)
+    assert found.counts == [4, 3]
+    assert sets(found.faces) == {frozenset({0, 1, 3}), frozenset({1, 2, 3}), frozenset({4, 5, 6})}
+    assert found.rows == {(4, 5)}
+
+
+def test_a_corner_does_not_become_sharper() -> None:
+    """Where the flip would, nothing changes."""
+    positions = np.array([[0, 0, 0], [0.5, -0.02, 0], [1, 0, 0], [0.5, 30, 0]])
+    for far, flips in ((30.0, False), (1.0, True)):
+        positions[3, 1] = far
+        found = thickened(pieces(positions, [[0, 1, 2], [0, 2, 3]]), np.ones(4, bool))
+        assert (frozenset({0, 1, 3}) in sets(found.faces)) == flips
 
 
 @pytest.mark.parametrize(("seed", "count"), [(0, 600), (1, 330), (2, 600), (3, 420)])

@@ -144,12 +144,13 @@ def too_small(report: Mapping[str, Any]) -> list[str]:
     """The promises of the shortest edge and of faces at curves where sizes are equal, as far as they are not kept."""
     from ..formfinding import Promise
 
-    remedy = "corners of the boundary or of creases that close stay: ask for more faces, or raise --corner-angle"
+    close, more = "corners of the boundary or of creases that close stay", "ask for more faces, or raise --corner-angle"
+    stay = "corners of the boundary and of creases stay, and edges of triangles along rows"
     reached, smallest = report["shortest_edge"], report["smallest_curve_face"]
-    promises = [Promise("shortest edge", _SHORTEST, reached, "at least", "mean edges", remedy=remedy)]
+    promises = [Promise("shortest edge", _SHORTEST, reached, "at least", "mean edges", remedy=f"{close}: {more}")]
     if smallest is not None and "spacing_shortest" not in report:
         name = "smallest face at the boundary and creases"
-        promises.append(Promise(name, _SMALLEST, smallest, "at least", "of the mean", remedy=remedy))
+        promises.append(Promise(name, _SMALLEST, smallest, "at least", "of the mean", remedy=f"{stay}: {more}"))
     return [str(promise) for promise in promises if not promise.holds]
 
 

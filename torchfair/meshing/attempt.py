@@ -28,8 +28,7 @@ from .seams import find_seams
 from .slit_faces import without_slits
 from .sound_map import sound_map
 from .surface import DesignSurface
-from .thin_triangles import rows_of, without_thin_triangles
-from .tracing import trace_cells
+from .tracing import Cells, trace_cells
 from .verification import shape_of, verified_topology, verify_corners, verify_creases
 
 _SHORTEST_RUN = 1.5  # spacings
@@ -62,8 +61,7 @@ def attempt(
         whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1), most))
         _verify(whole, surface, creases)
         if lattice.has_rows:
-            triangles = cut_cells(whole.positions, whole.faces, rows_of(cells, whole))
-            whole = without_thin_triangles(cells, whole._replace(faces=triangles))
+            whole = whole._replace(faces=cut_cells(whole.positions, whole.faces, _rows(cells, whole)))
         else:
             whole = whole._replace(faces=without_slits(whole.positions, whole.faces))
         _verify(whole, surface, creases)
@@ -73,7 +71,19 @@ def attempt(
     singular = np.flatnonzero(graph.charges)
     places, charges = frames.points[singular], graph.charges[singular]
     sharp = frames.points[frames.edges[creases.edges]]
-    return PieceMesh(whole.positions, whole.faces, rows_of(cells, whole), whole.creases, sharp, places, charges)
+    return PieceMesh(whole.positions, whole.faces, _rows(cells, whole), whole.creases, sharp, places, charges)
+
+
+def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
+    """Pairs of nodes that are ends of an edge on a line with the second coordinate constant."""
+    pairs = [
+        (face[side], face[(side + 1) % len(face)])
+        for face, on in zip(cells.faces, cells.coordinates, strict=True)
+        for side in range(len(face))
+        if on[side] == 1
+    ]
+    numbered = np.sort(whole.number[np.array(pairs, np.int64).reshape(-1, 2)], axis=1)
+    return {(int(a), int(b)) for a, b in numbered if 0 <= a < b}
 
 
 def _verify(whole: Compact, surface: DesignSurface, creases: Creases) -> None:

@@ -21,6 +21,7 @@ from .lattice import triangle_lattice
 from .no_mesh import NoMeshError
 from .plans import SCALES, scaled_words
 from .row_distances import row_sizes, rows_across
+from .thin_triangles import kept_vertices, without_thin_triangles
 from .three_valent import with_three_valent_inside
 from .turned_over import counted, told, turned_over
 from .unfolding import unfolded
@@ -153,4 +154,5 @@ class RowLattice:
         if len(pieces.positions) <= _COARSE and not (settings.adaptive and settings.spacing_range > 1):
             pieces = aligned(pieces, surface, spacing, settings, has_rows=True)
         pieces = on_surface(pieces, surface, settings)
+        pieces = without_thin_triangles(pieces, surface, kept_vertices(pieces, surface, settings, spacing))
         return _Laid(pieces, spacing, across, turned_over(pieces, surface), has_moved)

@@ -8,7 +8,7 @@ import numpy as np
 
 from .polygon_area import area_vector
 from .polygon_faces import Edge, PolygonFaces
-from .polygon_sides import sides_cross
+from .polygon_sides import sharpest_angle, sides_cross
 
 _TURN_DIGITS = 6  # of angles that are compared, so that rounding does not decide
 
@@ -16,11 +16,12 @@ _TURN_DIGITS = 6  # of angles that are compared, so that rounding does not decid
 class PolygonEdits(PolygonFaces):
     """Faces as lists of nodes that change; every change is checked before it is made."""
 
-    def collapse(self, edge: Edge, most: float = math.inf) -> bool:
+    def collapse(self, edge: Edge, most: float = math.inf, *, may_sharpen: bool = True) -> bool:
         """Collapses an edge to the end that is to stay: a fixed one, or one on the boundary or on a crease.
 
         Args:
             edge: two nodes, in either order.
+            may_sharpen: whether a corner of the faces around it may become sharper than their sharpest one was.
             most: radians by which an inner edge may have turned from its first direction afterwards. If that is finite,
                 of two ends that may stay it is the one for which less turns.
 
@@ -30,10 +31,10 @@ class PolygonEdits(PolygonFaces):
         """
         stays, goes = edge[::-1] if self._outranks(*edge[::-1]) else edge
         if math.isinf(most):
-            return self._collapse(stays, goes)
+            return self._collapse(stays, goes, may_sharpen=may_sharpen)
         ways = [(stays, goes), (goes, stays)][: 2 if self._rank(stays) == self._rank(goes) else 1]
         turned = sorted((round(self._turn(*way), _TURN_DIGITS), k, way) for k, way in enumerate(ways))
-        return any(turn <= most and self._collapse(*way) for turn, _, way in turned)
+        return any(turn <= most and self._collapse(*way, may_sharpen=may_sharpen) for turn, _, way in turned)
 
     def _turn(self, stays: int, goes: int) -> float:
         """By how much the inner edges of a node that goes are turned at most, radians."""
@@ -41,7 +42,7 @@ class PolygonEdits(PolygonFaces):
         moved = [node for node in self.neighbours(goes) - there - {stays} if not self.is_on_curve((node, goes))]
         return max((self.directions.turn(node, goes, stays) for node in moved), default=0.0)
 
-    def _collapse(self, stays: int, goes: int) -> bool:
+    def _collapse(self, stays: int, goes: int, *, may_sharpen: bool) -> bool:
         edge = stays, goes
         is_curve = self.is_on_curve(edge)
         if (
@@ -59,7 +60,7 @@ class PolygonEdits(PolygonFaces):
             if len(set(face)) != len(face):
                 return False
             changed[number] = face if len(face) >= 3 else []
-        if not self._allowed(changed):
+        if not self._allowed(changed) or not (may_sharpen or self._keeps_angles(changed)):
             return False
         self.directions.carry(self.neighbours(goes) - self.neighbours(stays) - {stays}, goes, stays)
         return self._apply(changed, goes, stays)
@@ -113,6 +114,11 @@ class PolygonEdits(PolygonFaces):
         if not all(self._is_fan(node, changed) for node in nodes):
             return False
         return all(self._keeps_side(number, face) for number, face in changed.items() if face)
+
+    def _keeps_angles(self, changed: dict[int, list[int]]) -> bool:
+        """Whether no corner of changed faces is sharper than their sharpest one was."""
+        before = min(sharpest_angle(self.positions[self.faces[number]]) for number in changed)
+        return min(sharpest_angle(self.positions[face]) for face in changed.values() if face) >= before
 
     def _keeps_side(self, number: int, face: list[int]) -> bool:
         normal = self.normals[number]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from .._graph import edge_numbers
 from ..principal import PrincipalEdges
 from ..settings.meshing_settings import MeshingSettings
 from ..topology import Topology
@@ -13,6 +12,7 @@ from .components import read_surface, spacing_of
 from .lattice_rows import RowLattice
 from .report import measure
 from .row_distances import row_distance
+from .row_edges import row_mask
 from .triangle_mesh import TriangleMesh
 from .verification import verified_topology
 
@@ -70,7 +70,7 @@ def principal_triangles(
     pieces, size = RowLattice(surface, ratio, size, count, chosen).laid()
     positions = torch.from_numpy(pieces.positions)
     made = verified_topology(pieces.faces, len(positions), surface.shape)
-    principal = PrincipalEdges(made, _mask(made, pieces.rows))
+    principal = PrincipalEdges(made, row_mask(made, pieces.rows))
     followed = principal.mask[: made.num_interior_edges]
     report = measure(positions, made, surface, size, pieces.indices, pieces.creases, followed)
     if vertices.device.type != "cpu":
@@ -85,10 +85,3 @@ def principal_triangles(
         {**report, "row_distance": ratio, **(pieces.sizes.report(size) if pieces.sizes else {})},
         [*surface.notes, *pieces.notes],
     )
-
-
-def _mask(topology: Topology, rows: set[tuple[int, int]]) -> Tensor:
-    mask = torch.zeros(topology.num_edges, dtype=torch.bool)
-    found = edge_numbers(topology, torch.tensor(sorted(rows), dtype=torch.int64).reshape(-1, 2))
-    mask[found[found >= 0]] = True
-    return mask

@@ -13,6 +13,7 @@ from ..errors import MeshError
 from ..fields.frames import Floats, Ints
 from ..topology import Topology
 from .creases import Creases
+from .polygon_sides import sharpest_angle
 
 _SHARPEST = math.radians(0.5)  # corner of a face
 
@@ -59,17 +60,9 @@ def verify_corners(positions: Floats, faces: list[list[int]]) -> None:
         MeshError: if one has.
     """
     by_size = [np.array([face for face in faces if len(face) == size]) for size in sorted({*map(len, faces)})]
-    sharpest = min(_sharpest(positions[of]) for of in by_size)
+    sharpest = min(sharpest_angle(positions[of]) for of in by_size)
     if not sharpest >= _SHARPEST:
         raise MeshError(f"a face would have a corner of {math.degrees(sharpest):.2g} degrees")
-
-
-def _sharpest(corners: Floats) -> float:
-    """The smallest angle of polygons (n, size, 3)."""
-    ahead = np.roll(corners, -1, axis=1) - corners
-    back = -np.roll(ahead, 1, axis=1)
-    sines = np.linalg.norm(np.cross(ahead, back), axis=2)
-    return float(np.arctan2(sines, (ahead * back).sum(2)).min())
 
 
 def verify_creases(topology: Topology, edges: Ints, creases: Creases) -> None:
