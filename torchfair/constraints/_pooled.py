@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import starmap
 from typing import Any, NamedTuple
 
 import torch
@@ -76,15 +75,11 @@ def _filled(groups: list[tuple[Tensor, Sequence[Tensor]]]) -> Group:
     for numbers, runs in groups:
         places = [torch.arange(width, device=numbers.device) for width in most]
         own = [place.clamp_max(run.shape[1] - 1) for place, run in zip(places, runs, strict=True)]
-        stencils.append(torch.cat(list(starmap(_columns, zip(runs, own, strict=True))), 1))
+        stencils.append(torch.cat([run[:, chosen] for run, chosen in zip(runs, own, strict=True)], 1))
         starts = [sum(most[:number]) for number in range(len(most))]
         source = torch.cat([place + start for place, start in zip(own, starts, strict=True)])
         sources.append(source.expand(len(numbers), -1))
     return Group(torch.cat([numbers for numbers, _ in groups]), torch.cat(stencils), torch.cat(sources), most)
-
-
-def _columns(run: Tensor, chosen: Tensor) -> Tensor:
-    return run[:, chosen]
 
 
 @dataclass(frozen=True)

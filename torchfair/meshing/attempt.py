@@ -59,19 +59,19 @@ def attempt(
         near = spacings[KDTree(frames.centres).query(cells.positions)[1]] if surface.sizes else spacings[:1]
         most = math.inf if lattice.has_rows else _MOST_TURN
         whole = compact(tidy_boundary(cells, near.min(1), lattice.cell * near.prod(1), most))
-        _verify(whole, surface, creases)
-        if lattice.has_rows:
-            whole = whole._replace(faces=cut_cells(whole.positions, whole.faces, _rows(cells, whole)))
-        else:
-            whole = whole._replace(faces=without_slits(whole.positions, whole.faces))
-        _verify(whole, surface, creases)
-        verify_corners(whole.positions, whole.faces)
+        faces, size, shape = whole.faces, len(whole.positions), shape_of(surface.topology)
+        verify_creases(verified_topology(faces, size, shape), whole.creases, creases)
+        rows = _rows(cells, whole)
+        cut = cut_cells(whole.positions, faces, rows) if lattice.has_rows else without_slits(whole.positions, faces)
+        if cut is not faces:
+            verified_topology(cut, size, shape)
+        verify_corners(whole.positions, cut)
     except MeshError as error:
         raise FailedAttemptError(str(error)) from None
     singular = np.flatnonzero(graph.charges)
     places, charges = frames.points[singular], graph.charges[singular]
     sharp = frames.points[frames.edges[creases.edges]]
-    return PieceMesh(whole.positions, whole.faces, _rows(cells, whole), whole.creases, sharp, places, charges)
+    return PieceMesh(whole.positions, cut, rows, whole.creases, sharp, places, charges)
 
 
 def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
@@ -84,12 +84,6 @@ def _rows(cells: Cells, whole: Compact) -> set[tuple[int, int]]:
     ]
     numbered = np.sort(whole.number[np.array(pairs, np.int64).reshape(-1, 2)], axis=1)
     return {(int(a), int(b)) for a, b in numbered if 0 <= a < b}
-
-
-def _verify(whole: Compact, surface: DesignSurface, creases: Creases) -> None:
-    """Raises MeshError if polygons have another topology than the surface, or other creases."""
-    made = verified_topology(whole.faces, len(whole.positions), shape_of(surface.topology))
-    verify_creases(made, whole.creases, creases)
 
 
 def _spacings(surface: DesignSurface, graph: CutGraph, plan: Plan) -> Floats:

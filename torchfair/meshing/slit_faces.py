@@ -8,7 +8,7 @@ import numpy as np
 
 from ..fields.frames import Floats
 from .polygon_area import area_vector
-from .polygon_sides import sides_cross
+from .polygon_sides import sharpest_angle, sides_cross
 
 Pair = tuple[int, int]
 
@@ -68,8 +68,7 @@ def _cut(positions: Floats, face: list[int], mean: float, taken: set[Pair]) -> l
         areas = [float(area_vector(positions, part) @ normal) / float(np.linalg.norm(normal)) for part in parts]
         if edge in taken or min(areas) <= 0 or any(sides_cross(positions[part], normal) for part in parts):
             continue
-        angles = np.concatenate([_angles(positions, part, normal) for part in parts])
-        sharpest = float(np.minimum(angles, 2 * np.pi - angles).min())
+        sharpest = min(sharpest_angle(positions[part]) for part in parts)
         rated = (min(min(areas) / mean, _SMALL), sharpest)
         if sharpest >= _SHARP and (best is None or rated > best[0]):
             best = rated, edge, parts

@@ -9,7 +9,7 @@ from ..settings.projection_settings import ProjectionSettings
 from .damping import Damping
 from .result import Status
 
-_MOST_IDLE = 8  # steps; none of hundreds of runs went on to lower its merit by 1e-9 after five of them
+_MOST_IDLE = 8  # steps in a row
 
 
 @dataclass(frozen=True)
