@@ -229,3 +229,15 @@ def test_sides_that_cross_are_found() -> None:
     assert 20 < sum(seen) < 140
     touching = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0, 0], [0, 2, 0]])
     assert not sides_cross(touching, np.array([0.0, 0, 1]))
+
+
+def test_a_collapse_may_be_forbidden_to_sharpen_corners() -> None:
+    """In a grid of quads it makes triangles, whose corners are sharper than right angles."""
+    found = edits()
+    before = {number: list(face) for number, face in found.faces.items()}
+    assert not found.collapse((5, 6), may_sharpen=False)
+    assert found.faces == before
+    assert found.collapse((5, 6))
+    fan = np.array([[0, 0, 0], [0.05, 0, 0], [0.5, 1, 0], [-1, 0, 0], [1.5, 0, 0]])
+    needle = PolygonEdits(fan, [[0, 1, 2], [3, 0, 2], [1, 4, 2]], np.ones(5, bool), np.zeros(5, bool))
+    assert needle.collapse((0, 1), may_sharpen=False)

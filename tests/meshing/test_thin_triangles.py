@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +12,10 @@ import torch
 from torchfair import Topology
 from torchfair.boundary import boundary_corners
 from torchfair.geometry import face_areas
-from torchfair.meshing import MeshingSettings, principal_triangles
+from torchfair.meshing import MeshingSettings, principal_triangles, thin_triangles
 from torchfair.meshing.components import Pieces
 from torchfair.meshing.mesh_creases import MeshCreases
-from torchfair.meshing.thin_triangles import thickened
+from torchfair.meshing.thin_triangles import thickened, without_thin_triangles
 from torchfair.shapes import PrincipalParaboloid, irregular_triangles
 
 KITE = np.array([[0, 0, 0], [0.5, -0.02, 0], [1, 0, 0], [0.5, 1, 0]], float)
@@ -117,6 +118,21 @@ def test_a_corner_does_not_become_sharper() -> None:
         positions[3, 1] = far
         found = thickened(pieces(positions, [[0, 1, 2], [0, 2, 3]]), np.ones(4, bool))
         assert (frozenset({0, 1, 3}) in sets(found.faces)) == flips
+
+
+@pytest.mark.parametrize("worse", ["turned_over", "_exceptions"])
+def test_nothing_changes_where_faces_would_be_turned_over_or_rows_lost(
+    worse: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kite, kept = pieces(KITE, [[0, 1, 2], [0, 2, 3]]), np.ones(4, bool)
+    nowhere: Any = None
+    measures = {"turned_over": lambda of, surface: range(of is not kite), "_exceptions": lambda of: int(of is not kite)}
+    fine = {"turned_over": lambda of, surface: range(3), "_exceptions": lambda of: 3}
+    for name, measure in {**fine, worse: measures[worse]}.items():
+        monkeypatch.setattr(thin_triangles, name, measure)
+    assert without_thin_triangles(kite, nowhere, kept) is kite
+    monkeypatch.setattr(thin_triangles, worse, fine[worse])
+    assert sets(without_thin_triangles(kite, nowhere, kept).faces) == {frozenset({0, 1, 3}), frozenset({1, 2, 3})}
 
 
 @pytest.mark.parametrize(("seed", "count"), [(0, 600), (1, 330), (2, 600), (3, 420)])
